@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 
 /// A window that moves with the newest variables. Older variables are marginalized at the end of an update,
-/// as by [`Session::marginalize`](crate::Session::marginalize).
+/// as by [`Smoother::marginalize`](crate::Smoother::marginalize).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "Document", into = "Document")]
-#[schemars(with = "Document")]
+#[serde(try_from = "WindowDocument", into = "WindowDocument")]
+#[schemars(with = "WindowDocument")]
 pub struct Window {
     /// Length of the window.
     pub span: Span,
@@ -23,7 +23,7 @@ pub enum Span {
     /// Number of variables that stay: the newest ones, without the types that are kept.
     Poses(NonZeroUsize),
     /// Seconds for which a variable stays after it was pushed. The newest variable always stays. The current
-    /// time is the last [`Session::set_time`](crate::Session::set_time).
+    /// time is the last [`Smoother::set_time`](crate::Smoother::set_time).
     Seconds(Positive),
 }
 
@@ -31,12 +31,12 @@ pub enum Span {
 #[derive(Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Window")]
-struct Document {
+struct WindowDocument {
     /// Number of variables that stay, at least one: the newest ones, without the types of `keep`. Older ones
-    /// are marginalized at the end of an update, as by `Session::marginalize`. Either this or `seconds`.
+    /// are marginalized at the end of an update, as by `Smoother::marginalize`. Either this or `seconds`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     poses: Option<NonZeroUsize>,
-    /// Time for which a variable stays after it was pushed, by the clock of `Session::set_time`. The newest
+    /// Time for which a variable stays after it was pushed, by the clock of `Smoother::set_time`. The newest
     /// variable always stays. Either this or `poses`. Unit: seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     seconds: Option<Positive>,
@@ -55,9 +55,9 @@ pub struct NotOneSpan {
     both: bool,
 }
 
-impl TryFrom<Document> for Window {
+impl TryFrom<WindowDocument> for Window {
     type Error = NotOneSpan;
-    fn try_from(Document { poses, seconds, keep }: Document) -> Result<Self, NotOneSpan> {
+    fn try_from(WindowDocument { poses, seconds, keep }: WindowDocument) -> Result<Self, NotOneSpan> {
         let span = match (poses, seconds) {
             (Some(poses), None) => Span::Poses(poses),
             (None, Some(seconds)) => Span::Seconds(seconds),
@@ -67,7 +67,7 @@ impl TryFrom<Document> for Window {
     }
 }
 
-impl From<Window> for Document {
+impl From<Window> for WindowDocument {
     fn from(Window { span, keep }: Window) -> Self {
         let (poses, seconds) = match span {
             Span::Poses(poses) => (Some(poses), None),

@@ -4,7 +4,7 @@ use crate::linear::settings::LinearSolver;
 use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::problem::CompileError;
-use crate::problem::{FactorPlace, Problem};
+use crate::problem::{Problem, ProblemFactor};
 use crate::strategy::auto::Auto;
 use crate::strategy::optimizer::Optimizer;
 use graduation::Graduation;
@@ -120,7 +120,7 @@ impl Gnc {
             *quantiles[rows]
                 .get_or_insert_with(|| 0.5 * square.unwrap_or_else(|| self.probability.chi_squared(rows)))
         };
-        let one = |(may, factor): (bool, &FactorPlace)| {
+        let one = |(may, factor): (bool, &ProblemFactor)| {
             let candidate = may && named(factor.name) && factor.rows > 0;
             candidate.then(|| bound(factor.rows as usize))
         };

@@ -131,7 +131,7 @@ impl Found {
             return Ok(());
         }
         let mut problem = Problem::compile(graph, values).map_err(Failure::input)?;
-        let at_start = problem.at_start();
+        let at_start = problem.diagnose_start();
         self.is_broken |= at_start.not_finite.is_some();
         self.warnings.extend(report::at_start(&at_start, graph.factors().len()));
         if at_start.not_finite.is_none() {

@@ -11,7 +11,7 @@ use clap::Args;
 use manifactor::slam::online::{FrameError, FrameReport, Mapper};
 use manifactor::slam::run::{RunError, Watch};
 use manifactor::slam::sequence::Observation;
-use manifactor::solve::{All, Interrupt};
+use manifactor::solve::{AllObservers, Interrupt};
 use serde_json::json;
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
@@ -68,7 +68,7 @@ impl Online {
             let mut progress = Progress::new(verbose, &variant.name);
             let interrupted = interrupt.clone();
             let mut solve = Solve(view.as_ref());
-            let mut observers = All(vec![&mut progress, &mut interrupt, &mut solve]);
+            let mut observers = AllObservers(vec![&mut progress, &mut interrupt, &mut solve]);
             let mut frames =
                 Frames { command: self, interrupt: interrupted, view: view.as_ref(), frames: 0, begun: None };
             let done = run.variant_online(variant, &mut frames, &mut observers)?;
@@ -131,7 +131,7 @@ impl Frames<'_> {
 
     fn tell(&self, report: &FrameReport, mapper: &Mapper, took: f64) {
         let (objects, undetermined) =
-            (mapper.mapped(), report.updates.last().map_or(0, |u| u.undetermined.len()));
+            (mapper.mapped(), report.updates.last().map_or(0, |u| u.undetermined_directions.len()));
         if self.command.options.json {
             output::json_line(&json!({ "seconds": took, "objects": objects, "report": report }));
         } else {

@@ -12,8 +12,8 @@ use clap::Args;
 use manifactor::formats::replay::{Latencies, Replay as Steps, Step};
 use manifactor::graph::{Graph, Key};
 use manifactor::slam::output::OutputFolder;
-use manifactor::smoother::{Finished, Rejection, Report, Session, Span};
-use manifactor::solve::{All, Interrupt, Silent};
+use manifactor::smoother::{Finished, Rejection, Smoother, Span, UpdateReport};
+use manifactor::solve::{AllObservers, Interrupt, Silent};
 use manifactor::viz::latencies;
 use serde_json::json;
 use std::collections::HashSet;
@@ -57,9 +57,9 @@ const NAMED: usize = 6;
 
 /// Result of a replay.
 struct Replayed {
-    session: Session,
+    session: Smoother,
     times: Vec<f64>,
-    report: Report,
+    report: UpdateReport,
     interrupted: bool,
     /// Number of factors left out because a variable had already left the window.
     left_out: usize,
@@ -97,7 +97,7 @@ impl Replay {
         let mut replayed = self.replay(&input, &interrupt)?;
         let cost = replayed.session.cost();
         let clock = Instant::now();
-        let observer = &mut All(vec![&mut interrupt]);
+        let observer = &mut AllObservers(vec![&mut interrupt]);
         let finished = match replayed.interrupted {
             true => None,
             false => Some(replayed.session.finish(&*input.optimizer, observer).map_err(Failure::input)?),
@@ -121,8 +121,8 @@ impl Replay {
     }
 
     fn replay(&self, input: &GraphFile, interrupt: &Interrupt) -> Result<Replayed, Failure> {
-        let session = Session::new(input.online.clone());
-        let report = Report::default();
+        let session = Smoother::new(input.online.clone());
+        let report = UpdateReport::default();
         let mut replayed = Replayed { session, times: vec![], report, interrupted: false, left_out: 0 };
         let mut steps = Steps::of(&input.graph, &input.values);
         if steps.is_empty() {
@@ -172,7 +172,7 @@ impl Replay {
             });
             output::json_line(&line);
         } else {
-            let (redone, last) = (count(report.redone, "variable"), seconds(last));
+            let (redone, last) = (count(report.refactorized, "variable"), seconds(last));
             let gap = gap.map_or_else(String::new, |gap| format!(", {gap:.1e} above the batch"));
             output::say(&format!(
                 "{}: cost {cost:.6}{gap}, last update {last} ({redone} redone)",
@@ -195,8 +195,8 @@ impl Replay {
                 "latencies": latencies,
                 "bytes": session.bytes(),
                 "cost": cost,
-                "parked": report.parked,
-                "undetermined": report.undetermined,
+                "parked": report.undetermined_variables,
+                "undetermined": report.undetermined_directions,
                 "inactive": report.inactive,
                 "final_cost": outcome.map(|o| o.final_cost),
                 "termination": outcome.map(|o| &o.termination),
@@ -237,10 +237,13 @@ impl Replay {
             let more = if rejections.len() > NAMED { ", …; see --json" } else { "" };
             text += &format!("{}{more}\n", first.join(", "));
         }
-        if !report.parked.is_empty() {
-            text += &format!("waiting for factors that determine them: {}\n", keys(&report.parked));
+        if !report.undetermined_variables.is_empty() {
+            text += &format!(
+                "waiting for factors that determine them: {}\n",
+                keys(&report.undetermined_variables)
+            );
         }
-        for (key, direction) in &report.undetermined {
+        for (key, direction) in &report.undetermined_directions {
             text += &format!("nothing constrains {key}.{direction}\n");
         }
         output::print(&text);
@@ -248,7 +251,7 @@ impl Replay {
 }
 
 /// Removes the factors of variables that are no longer in the smoother, and returns their number.
-fn leave_out(step: &mut Step, session: &Session) -> usize {
+fn leave_out(step: &mut Step, session: &Smoother) -> usize {
     let is_there = |key: &Key| step.values.contains(key.as_str()) || session.estimate(key.as_str()).is_some();
     let mut factors = Graph::new();
     for entry in step.factors.factors().iter().filter(|entry| entry.keys.iter().all(is_there)) {

@@ -13,7 +13,7 @@ use manifactor::slam::record::{RunRecord, VariantRecord};
 use manifactor::slam::report::{RunReport, VariantReport};
 use manifactor::slam::run::{Run as Running, RunError};
 use manifactor::slam::run_document::Variant;
-use manifactor::solve::{All, Interrupt, Observer};
+use manifactor::solve::{AllObservers, Interrupt, Observer};
 use manifactor::viz::{latencies, ply, run_page};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -51,7 +51,7 @@ impl Run {
         let mut interrupt = interrupt::on_ctrl_c();
         let report = self.options.run_as("run", verbose, interrupt.clone(), |run, variant| {
             let mut watch = Watch::new(verbose, &variant.name);
-            run.variant(variant, &mut All(vec![&mut watch, &mut interrupt]))
+            run.variant(variant, &mut AllObservers(vec![&mut watch, &mut interrupt]))
         })?;
         if self.options.json {
             output::json(&report);

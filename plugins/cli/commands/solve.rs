@@ -11,7 +11,7 @@ use crate::output::{self, report};
 use crate::status::Status;
 use clap::Args;
 use manifactor::geometry::certify;
-use manifactor::solve::{All, Solution, solve};
+use manifactor::solve::{AllObservers, Solution, solve};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -51,7 +51,7 @@ impl Solve {
         }
         let mut watch = Watch::new(verbose, "solving");
         let mut interrupt = interrupt::on_ctrl_c();
-        let mut observer = All(vec![&mut watch, &mut interrupt]);
+        let mut observer = AllObservers(vec![&mut watch, &mut interrupt]);
         let clock = Instant::now();
         let values = input.start.start(&input.graph, &input.values).map_err(Failure::input)?;
         let start = clock.elapsed().as_secs_f64();
@@ -108,7 +108,7 @@ impl Solve {
             "termination": outcome.termination,
             "undetermined": outcome.undetermined,
             "moving": outcome.moving,
-            "untouched": outcome.untouched,
+            "untouched": outcome.unconstrained,
             "inactive": outcome.inactive,
             "inactive_factors": outcome.inactive_factors,
             "rejected": outcome.rejected,

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use manifactor::config::{Definitions, Document, Errors, Format, graph_root, read_graph_section};
 use manifactor::formats::{self, GraphFormat, GraphRead, Repair};
 use manifactor::graph::{Graph, Values};
-use manifactor::smoother::Settings as Online;
+use manifactor::smoother::SmootherSettings as Online;
 use manifactor::solve::{Bytes, Optimizer, Start, available_memory, memory_limit};
 use serde_json::Value;
 use std::collections::BTreeMap;

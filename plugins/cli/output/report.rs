@@ -1,6 +1,8 @@
 //! The result of a solve as text.
 use crate::output::text::{self, Table, count, list, seconds};
-use manifactor::solve::{AtStart, Diagnosis, FactorCost, InactiveFactor, Marginal, Outcome, Weak};
+use manifactor::solve::{
+    Diagnosis, FactorCost, InactiveFactor, Marginal, Outcome, StartDiagnosis, WeakDirection,
+};
 
 /// The outcome in a few lines: termination, cost and times.
 pub(crate) fn outcome(outcome: &Outcome) -> String {
@@ -54,7 +56,7 @@ fn factor(factor: &InactiveFactor) -> String {
 }
 
 /// Findings at the initial values, one per line.
-pub(crate) fn at_start(found: &AtStart, factors: usize) -> Vec<String> {
+pub(crate) fn at_start(found: &StartDiagnosis, factors: usize) -> Vec<String> {
     let mut lines = vec![];
     if let Some(bad) = &found.not_finite {
         lines.push(format!("factor {} is not finite at these values: begin elsewhere", factor(bad)));
@@ -62,9 +64,9 @@ pub(crate) fn at_start(found: &AtStart, factors: usize) -> Vec<String> {
     if found.inactive > 0 {
         lines.push(inactive(found.inactive, factors, &found.inactive_factors));
     }
-    lines.extend(found.untouched.iter().map(ToString::to_string));
+    lines.extend(found.unconstrained.iter().map(ToString::to_string));
     lines.extend(found.undetermined.iter().map(|open| format!("at these values, {open}")));
-    if let Some(Weak { condition, direction }) = &found.weak {
+    if let Some(WeakDirection { condition, direction }) = &found.weak {
         lines.push(format!(
             "at these values, next to {direction}: the condition number is {condition:.0e}, so about {:.0} of 16 digits are lost",
             condition.log10()

@@ -28,7 +28,7 @@ use manifactor_mapping::semantics::RuleError;
 use manifactor_mapping::settings::Settings;
 use manifactor_quadric::{Camera, DualQuadric};
 use manifactor_recording::sequence::{Frame, ObjectId, Observation, Opening, Sequence};
-use manifactor_smoother::{ChangeError, Session, UpdateError};
+use manifactor_smoother::{ChangeError, Smoother, UpdateError};
 use manifactor_solve::Observer;
 use object::Tracked;
 use std::any::TypeId;
@@ -47,7 +47,7 @@ pub use locate::Located;
 pub struct Mapper {
     settings: Arc<Settings>,
     camera: Camera,
-    session: Session,
+    session: Smoother,
     up: Up,
     associator: Box<dyn Associator>,
     /// Current objects of detections that were assigned differently at first.
@@ -133,7 +133,7 @@ impl Mapper {
             measurements.objects.iter().filter_map(|measured| Some((measured.id, Tracked::known(measured)?)));
         Self {
             camera: opening.camera,
-            session: Session::new(online),
+            session: Smoother::new(online),
             associator: settings.association.begin(opening.camera, &settings.aliases, &known),
             settings: Arc::new(settings),
             names: Names::default(),
@@ -186,7 +186,7 @@ impl Mapper {
     }
 
     /// Returns the smoother with the current graph and estimate.
-    pub fn session(&mut self) -> &mut Session {
+    pub fn session(&mut self) -> &mut Smoother {
         &mut self.session
     }
 

@@ -199,7 +199,7 @@ fn a_stream_that_is_killed_at_any_moment_goes_on_with_the_same_map() {
         assert!(read(&whole) == read(&out), "{file}");
     }
     // different settings make a different map
-    let ran = fed(&format!("{command} --set online.bend=0.2"), &frames);
+    let ran = fed(&format!("{command} --set online.relinearization_threshold=0.2"), &frames);
     ran.ended(2).complains("is the journal of other settings");
 }
 

@@ -82,7 +82,7 @@ fn settings_come_from_the_document_and_the_command_line() {
         (lines(&ran.stdout)[0]["gap"].as_f64().unwrap(), relinearized)
     };
     // every update relinearizes all moving variables, so the last update is a Gauss-Newton step
-    let exact = "--set online.relinearize_every=1 --set online.bend=0 --set online.deviation=0";
+    let exact = "--set online.relinearize_every=1 --set online.relinearization_threshold=0 --set online.wildfire_threshold=0";
     assert!(gap(exact).0 < 1e-9 && gap(exact).1 > gap("").1);
     // the same settings from a document
     let literal = path(&folder, "square.toml");
@@ -93,8 +93,12 @@ fn settings_come_from_the_document_and_the_command_line() {
     let ran = manifactor(&format!("replay {literal} --json --gap")).ended(0);
     assert!(lines(&ran.stdout)[0]["gap"].as_f64().unwrap() < 1e-9);
     manifactor(&format!("solve {literal}")).ended(0);
-    manifactor(&format!("replay {graph} --set online.bend=-1")).ended(2).complains("0 or more");
-    manifactor(&format!("replay {graph} --set online.bent=1")).ended(2).complains("did you mean `bend`?");
+    manifactor(&format!("replay {graph} --set online.relinearization_threshold=-1"))
+        .ended(2)
+        .complains("0 or more");
+    manifactor(&format!("replay {graph} --set online.wildfire_treshold=1"))
+        .ended(2)
+        .complains("did you mean `wildfire_threshold`?");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Selection of the factors that may be outliers.
 use crate::odometry::{by_variables, is_sequential};
-use crate::problem::{FactorPlace, Problem};
+use crate::problem::{Problem, ProblemFactor};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +23,7 @@ impl Candidates {
     pub(crate) fn of(self, problem: &Problem) -> Vec<bool> {
         let all = problem.model.factors.iter().map(|factor| (factor.variables.to_vec(), ()));
         let connections = by_variables(all);
-        let may = |factor: &FactorPlace| match self {
+        let may = |factor: &ProblemFactor| match self {
             Self::All => true,
             Self::LoopClosures => {
                 let place = |variable: &u32| &problem.model.variables[*variable as usize];

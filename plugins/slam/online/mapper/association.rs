@@ -12,7 +12,7 @@ use manifactor_mapping::mapping::{object_key, pose_key};
 use manifactor_mapping::settings::Settings;
 use manifactor_quadric::DualQuadric;
 use manifactor_recording::sequence::ObjectId;
-use manifactor_smoother::{FactorId, Session};
+use manifactor_smoother::{FactorId, Smoother};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Share of the boxes of an object that may change at once. Beyond it, the object is removed and initialized
@@ -25,7 +25,7 @@ pub(super) struct Known<'a> {
     /// Index and pose of the last frame.
     pub newest: (usize, Se3),
     pub live: &'a [StampedPose],
-    pub session: &'a Session,
+    pub session: &'a Smoother,
     pub measurements: &'a Measurements,
 }
 

@@ -11,7 +11,7 @@ use manifactor_mapping::mapping::{known_entry, object_key, pose_key, prior_entry
 use manifactor_mapping::semantics::RuleError;
 use manifactor_mapping::settings::Settings;
 use manifactor_recording::sequence::{Detection, Frame, ObjectId, Observation, UnusedDetection};
-use manifactor_smoother::{ChangeError, FactorId, Report};
+use manifactor_smoother::{ChangeError, FactorId, UpdateReport};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -54,7 +54,7 @@ pub struct FrameReport {
     pub refused: Vec<String>,
     /// Smoother reports: one for the frame with corrections of earlier frames, a second one if objects are
     /// added or removed.
-    pub updates: Vec<Report>,
+    pub updates: Vec<UpdateReport>,
 }
 
 /// The content of a frame after its pose is added.
@@ -107,7 +107,7 @@ impl FrameReport {
         put(before.withdrawn, &mut self.withdrawn);
         put(before.revised, &mut self.revised);
         put(before.refused, &mut self.refused);
-        let is_told = |update: &Report| {
+        let is_told = |update: &UpdateReport| {
             update.solved_batch || !(update.rejected.is_empty() && update.readmitted.is_empty())
         };
         put(before.updates.into_iter().filter(is_told).collect(), &mut self.updates);
