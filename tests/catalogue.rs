@@ -10,7 +10,7 @@ use manifactor::slam::gravity::Gravity;
 use manifactor::slam::motion::MotionModel;
 use manifactor::slam::run_document::RunDocument;
 use manifactor::slam::schema::run_root;
-use manifactor::slam::source::Source;
+use manifactor::slam::source::SequenceSource;
 use manifactor::solve::{Optimizer, Start};
 use manifactor_testing::catalogue::{documentation_law, factor_law, loss_law, manifold_law};
 use serde::{Serialize, de::DeserializeOwned};
@@ -155,7 +155,7 @@ macro_rules! for_kind {
             k if k == <dyn Loss as Kind>::NAME => $call::<Box<dyn Loss>>($($argument),*),
             k if k == <dyn Optimizer as Kind>::NAME => $call::<Box<dyn Optimizer>>($($argument),*),
             k if k == <dyn Start as Kind>::NAME => $call::<Box<dyn Start>>($($argument),*),
-            k if k == <dyn Source as Kind>::NAME => $call::<Box<dyn Source>>($($argument),*),
+            k if k == <dyn SequenceSource as Kind>::NAME => $call::<Box<dyn SequenceSource>>($($argument),*),
             k if k == <dyn Association as Kind>::NAME => $call::<Box<dyn Association>>($($argument),*),
             k if k == <dyn Gravity as Kind>::NAME => $call::<Box<dyn Gravity>>($($argument),*),
             k if k == <dyn AnyCamera as Kind>::NAME => $call::<Box<dyn AnyCamera>>($($argument),*),

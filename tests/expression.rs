@@ -17,7 +17,7 @@ fn estimates() -> Vec<Estimate> {
     document.set(&["source.trajectory.frames=40"]).unwrap();
     let document = RunDocument::read(&document).unwrap_or_else(|e| panic!("{e}"));
     let mut run = Run::new(&document, None);
-    document.variants.iter().map(|variant| run.variant(variant, &mut Silent).unwrap().0).collect()
+    document.variants.iter().map(|variant| run.run_variant(variant, &mut Silent).unwrap().0).collect()
 }
 
 fn apart(a: &Values, b: &Values) -> f64 {

@@ -1,7 +1,7 @@
 //! Cache of compiled formulas; factors that differ only in constants share a program.
 use crate::compile::compile;
 use crate::program::Program;
-use crate::scope::{Named, Scope};
+use crate::scope::{NameMeaning, Scope};
 use indexmap::IndexMap;
 use manifactor_graph::TextError;
 use std::any::TypeId;
@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
 /// Maximum number of cached formulas. A typical process has a few; if it is full, the cache is cleared.
-const MOST: usize = 256;
+const MAX_CACHED: usize = 256;
 
 /// Inputs that determine a program, except for the values of its constants.
 #[derive(PartialEq, Eq, Hash)]
@@ -33,8 +33,8 @@ pub(crate) fn program(
 ) -> Result<(Program, bool), TextError> {
     let names = scope.names.iter().map(|(name, named)| match named {
         // Several types of variables may have equal shapes.
-        Named::Variable(quantity) => (name.clone(), quantity.shape.name, Some((quantity.type_id)())),
-        Named::Constant(shape, _) => (name.clone(), shape.name, None),
+        NameMeaning::Variable(quantity) => (name.clone(), quantity.shape.name, Some((quantity.type_id)())),
+        NameMeaning::Constant(shape, _) => (name.clone(), shape.name, None),
     });
     let define_pairs = define.iter().map(|(name, text)| (name.clone(), text.clone()));
     let formulas = Formulas {
@@ -48,8 +48,8 @@ pub(crate) fn program(
     drop(known);
     if let Some((program, uses_up)) = found {
         let constants = scope.names.values().filter_map(|named| match named {
-            Named::Constant(_, flat) => Some(flat.as_slice()),
-            Named::Variable(_) => None,
+            NameMeaning::Constant(_, flat) => Some(flat.as_slice()),
+            NameMeaning::Variable(_) => None,
         });
         if let Some(program) = program.with(constants) {
             return Ok((program, uses_up));
@@ -59,7 +59,7 @@ pub(crate) fn program(
     let compiled = compile(scope, define, residual, domain)?;
     let mut known = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
     let all = known.get_or_insert_default();
-    if all.len() >= MOST {
+    if all.len() >= MAX_CACHED {
         all.clear();
     }
     all.insert(formulas, compiled.clone());

@@ -3,7 +3,7 @@
 use crate::mistake::Mistake;
 use crate::program::{Code, Pass, Program, Step};
 use crate::resolve::Library;
-use crate::scope::{Named, Scope, UP, check_name};
+use crate::scope::{NameMeaning, Scope, UP, check_name};
 use crate::syntax::{Formula, Node, parse};
 use indexmap::IndexMap;
 use manifactor_graph::TextError;
@@ -72,12 +72,12 @@ impl<'a> Compiler<'a> {
         for (name, what) in &scope.names {
             let at = values.len();
             let (shape, depends) = match what {
-                Named::Constant(shape, flat) => {
+                NameMeaning::Constant(shape, flat) => {
                     values.extend_from_slice(flat);
                     code.constants.push(at);
                     (*shape, 0)
                 }
-                Named::Variable(quantity) => {
+                NameMeaning::Variable(quantity) => {
                     let number = code.inputs.len();
                     values.resize(at + quantity.shape.size, 0.0);
                     code.types.push((quantity.type_id)());

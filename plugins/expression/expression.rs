@@ -54,7 +54,7 @@ pub enum ExpressionError {
     #[error("`residual` is empty: expected at least one formula, such as \"norm(position(x)) - 1\"")]
     NoResidual,
     /// There are no variables, or too many.
-    #[error("expected 1 to {most} variables, such as variables = {{ q = \"dual_quadric\" }}, found {0}", most = MOST)]
+    #[error("expected 1 to {most} variables, such as variables = {{ q = \"dual_quadric\" }}, found {0}", most = MAX_VARIABLES)]
     WrongVariables(usize),
     /// A formula, a name or a type is invalid.
     #[error(transparent)]
@@ -65,7 +65,7 @@ pub enum ExpressionError {
 }
 
 /// Maximum number of variables of a factor.
-const MOST: usize = 32;
+const MAX_VARIABLES: usize = 32;
 
 impl TryFrom<Document> for Expression {
     type Error = ExpressionError;
@@ -74,7 +74,7 @@ impl TryFrom<Document> for Expression {
         if residual.is_empty() {
             return Err(ExpressionError::NoResidual);
         }
-        if variables.is_empty() || variables.len() > MOST {
+        if variables.is_empty() || variables.len() > MAX_VARIABLES {
             return Err(ExpressionError::WrongVariables(variables.len()));
         }
         let scope = Scope::new(variables, constants, *up.unwrap_or_default())?;

@@ -59,14 +59,14 @@ pub(crate) struct Pass {
 
 /// Work space, one per thread, so that evaluation allocates nothing.
 #[derive(Default)]
-struct Room {
+struct Workspace {
     numbers: Vec<f64>,
     lanes: Vec<Lanes>,
     gradients: Vec<f64>,
 }
 
 thread_local! {
-    static ROOM: RefCell<Room> = RefCell::default();
+    static WORKSPACE: RefCell<Workspace> = RefCell::default();
 }
 
 impl Step {
@@ -124,8 +124,8 @@ impl Code {
     }
 
     /// Computes the Jacobian block of a variable, once all values are known.
-    fn differentiate(&self, variable: usize, x: &dyn Any, room: &mut Room, block: &mut [f64]) {
-        let Room { numbers, lanes, gradients } = room;
+    fn differentiate(&self, variable: usize, x: &dyn Any, room: &mut Workspace, block: &mut [f64]) {
+        let Workspace { numbers, lanes, gradients } = room;
         let (pass, (quantity, at), rows) = (&self.passes[variable], self.inputs[variable], self.rows.len());
         let (size, dimension) = (quantity.shape.size, quantity.dimension);
         if lanes.len() < numbers.len() {
@@ -168,13 +168,13 @@ impl DynamicResidual for Program {
     }
     fn is_defined(&self, variables: &[&dyn Any]) -> bool {
         self.code.domain.is_empty()
-            || ROOM.with_borrow_mut(|room| {
+            || WORKSPACE.with_borrow_mut(|room| {
                 self.code.run(&self.values, variables, &mut room.numbers);
                 self.code.domain.iter().all(|slot| room.numbers[*slot] > 0.0)
             })
     }
     fn residual(&self, variables: &[&dyn Any], residual: &mut [f64]) {
-        ROOM.with_borrow_mut(|room| {
+        WORKSPACE.with_borrow_mut(|room| {
             self.code.run(&self.values, variables, &mut room.numbers);
             residual.iter_mut().zip(&self.code.rows).for_each(|(r, slot)| *r = room.numbers[*slot]);
         });
@@ -186,7 +186,7 @@ impl DynamicResidual for Program {
         residual: &mut [f64],
         blocks: &mut DynamicBlocks,
     ) {
-        ROOM.with_borrow_mut(|room| {
+        WORKSPACE.with_borrow_mut(|room| {
             self.code.run(&self.values, variables, &mut room.numbers);
             residual.iter_mut().zip(&self.code.rows).for_each(|(r, slot)| *r = room.numbers[*slot]);
             for (variable, x) in variables.iter().enumerate().filter(|(variable, _)| free[*variable]) {

@@ -1,13 +1,13 @@
 //! Resolves calls to functions, with error messages for calls that match none.
 use crate::mistake::Mistake;
-use crate::scope::{Named, Scope};
+use crate::scope::{NameMeaning, Scope};
 use manifactor_config::nearest;
 use manifactor_graph::quantity::{Function, Quantity, Shape, functions};
 use std::ops::Range;
 use std::sync::OnceLock;
 
 /// Maximum number of signatures in a message.
-const LISTED: usize = 6;
+const MAX_LISTED: usize = 6;
 
 /// All linked functions.
 pub(crate) struct Library {
@@ -85,8 +85,8 @@ impl Library {
 
     fn unknown_function(&self, name: &str, at: Range<usize>, scope: &Scope) -> Mistake {
         let message = match scope.names.get(name) {
-            Some(Named::Variable(_)) => format!("`{name}` is a variable, not a function"),
-            Some(Named::Constant(..)) => format!("`{name}` is a constant, not a function"),
+            Some(NameMeaning::Variable(_)) => format!("`{name}` is a variable, not a function"),
+            Some(NameMeaning::Constant(..)) => format!("`{name}` is a constant, not a function"),
             None => format!("unknown function `{name}`"),
         };
         let meant = nearest(name, self.words()).map(|near| format!("did you mean `{near}`?"));
@@ -168,8 +168,8 @@ fn counts(named: &[&Function]) -> String {
 }
 
 fn signatures(named: &[&Function]) -> String {
-    let listed: Vec<String> = named.iter().take(LISTED).map(|f| f.signature()).collect();
-    let more = named.len().saturating_sub(LISTED);
+    let listed: Vec<String> = named.iter().take(MAX_LISTED).map(|f| f.signature()).collect();
+    let more = named.len().saturating_sub(MAX_LISTED);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     format!("there is {}{more}", listed.join(", "))
 }

@@ -11,9 +11,9 @@ use nalgebra::Vector3;
 /// Name of the world's up direction.
 pub(crate) const UP: &str = "up";
 /// Reserved names.
-const TAKEN: [&str; 2] = [UP, "pi"];
+const RESERVED: [&str; 2] = [UP, "pi"];
 /// Meaning of a name.
-pub(crate) enum Named {
+pub(crate) enum NameMeaning {
     Variable(&'static VariableQuantity),
     /// Shape and flat form of the value.
     Constant(Shape, Vec<f64>),
@@ -22,7 +22,7 @@ pub(crate) enum Named {
 /// Names with their meaning; variables come first, in the order of a factor's keys.
 #[derive(Default)]
 pub(crate) struct Scope {
-    pub names: IndexMap<String, Named>,
+    pub names: IndexMap<String, NameMeaning>,
 }
 
 impl Scope {
@@ -33,7 +33,7 @@ impl Scope {
     ) -> Result<Self, TextError> {
         let mut scope = Self::default();
         for (name, of) in variables {
-            scope.add(name, Named::Variable(quantity_of(of)?))?;
+            scope.add(name, NameMeaning::Variable(quantity_of(of)?))?;
         }
         for (name, constant) in constants {
             let flat = constant.flat().and_then(|(shape, flat)| match flat.iter().all(|x| x.is_finite()) {
@@ -43,25 +43,25 @@ impl Scope {
             let (shape, flat) = flat.map_err(|why| {
                 Mistake::new(0..name.len(), format!("the constant `{name}`: {why}")).within(name)
             })?;
-            scope.add(name, Named::Constant(shape, flat))?;
+            scope.add(name, NameMeaning::Constant(shape, flat))?;
         }
         let always = [
             (UP, Vector3::<f64>::SHAPE, up.as_slice().to_vec()),
             ("pi", f64::SHAPE, vec![std::f64::consts::PI]),
         ];
         for (name, shape, flat) in always {
-            scope.names.insert(name.to_owned(), Named::Constant(shape, flat));
+            scope.names.insert(name.to_owned(), NameMeaning::Constant(shape, flat));
         }
         Ok(scope)
     }
 
     /// Returns the names of the variables.
     pub(crate) fn variables(&self) -> impl Iterator<Item = &str> {
-        let variables = self.names.iter().filter(|(_, named)| matches!(named, Named::Variable(_)));
+        let variables = self.names.iter().filter(|(_, named)| matches!(named, NameMeaning::Variable(_)));
         variables.map(|(name, _)| name.as_str())
     }
 
-    fn add(&mut self, name: &str, named: Named) -> Result<(), TextError> {
+    fn add(&mut self, name: &str, named: NameMeaning) -> Result<(), TextError> {
         let wrong = |message: String| Mistake::new(0..name.len(), message).within(name);
         check_name(name).map_err(|mistake| mistake.within(name))?;
         match self.names.insert(name.to_owned(), named) {
@@ -79,7 +79,7 @@ pub(crate) fn check_name(name: &str) -> Result<(), Mistake> {
     if !plain {
         return Err(wrong(format!("`{name}` is not a name: expected letters, digits and `_`")));
     }
-    if TAKEN.contains(&name) {
+    if RESERVED.contains(&name) {
         return Err(wrong(format!("`{name}` means something already: choose another name")));
     }
     Ok(())

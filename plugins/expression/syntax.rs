@@ -9,9 +9,9 @@ use winnow::token::{any, take_while};
 use winnow::{ModalResult, Parser};
 
 /// Maximum length of a formula, in bytes. The parser is recursive, so its depth has to be limited.
-const LONGEST: usize = 2000;
+const MAX_FORMULA_BYTES: usize = 2000;
 /// Maximum nesting depth of parentheses and brackets.
-const DEEPEST: usize = 64;
+const MAX_NESTING: usize = 64;
 
 /// A formula or a part of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,12 +42,14 @@ pub(crate) fn parse(text: &str) -> Result<Formula, Mistake> {
             Mistake::new(0..text.len(), "the formula is empty").help("expected one such as `norm(v) - 1`")
         );
     }
-    if text.len() > LONGEST {
-        let message = format!("{} bytes are more than the {LONGEST} that a formula may have", text.len());
-        return Err(Mistake::new(LONGEST..LONGEST, message).help("split it over several rows or factors"));
+    if text.len() > MAX_FORMULA_BYTES {
+        let message =
+            format!("{} bytes are more than the {MAX_FORMULA_BYTES} that a formula may have", text.len());
+        return Err(Mistake::new(MAX_FORMULA_BYTES..MAX_FORMULA_BYTES, message)
+            .help("split it over several rows or factors"));
     }
     if let Some(at) = too_deep(text) {
-        return Err(Mistake::new(at..at + 1, format!("nested more than {DEEPEST} levels deep")));
+        return Err(Mistake::new(at..at + 1, format!("nested more than {MAX_NESTING} levels deep")));
     }
     let mut input = Input::new(text);
     let formula = formula(&mut input).map_err(inner)?;
@@ -87,7 +89,7 @@ fn too_deep(text: &str) -> Option<usize> {
             b')' | b']' => depth = depth.saturating_sub(1),
             _ => {}
         }
-        depth > DEEPEST
+        depth > MAX_NESTING
     })
 }
 

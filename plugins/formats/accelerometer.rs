@@ -2,7 +2,7 @@
 //!
 //! Several readings may share a timestamp, because the sensor is read in bursts, but timestamps must not
 //! decrease.
-use crate::error::{FormatError, Mistake, Problems};
+use crate::error::{FormatError, Mistake, ProblemList};
 use crate::lines::{Fields, lines};
 use crate::text::read_text;
 use nalgebra::Vector3;
@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// An accelerometer reading with its timestamp.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Acceleration {
+pub struct StampedAcceleration {
     /// Timestamp, in seconds.
     pub timestamp: f64,
     /// Acceleration in the sensor's frame, in m/s²; at rest it points up.
@@ -21,7 +21,7 @@ pub struct Acceleration {
 ///
 /// # Errors
 /// If a line is malformed or timestamps decrease; the error lists all such lines.
-pub fn read(path: impl AsRef<Path>) -> Result<Vec<Acceleration>, FormatError> {
+pub fn read(path: impl AsRef<Path>) -> Result<Vec<StampedAcceleration>, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path)
 }
@@ -30,9 +30,9 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<Acceleration>, FormatError> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<Acceleration>, FormatError> {
-    let mut problems = Problems::of(path.as_ref(), text);
-    let mut readings: Vec<Acceleration> = vec![];
+pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<StampedAcceleration>, FormatError> {
+    let mut problems = ProblemList::of(path.as_ref(), text);
+    let mut readings: Vec<StampedAcceleration> = vec![];
     for (line, text) in lines(text) {
         let previous = readings.last().map_or(f64::NEG_INFINITY, |r| r.timestamp);
         let reading = Fields::of(text, "timestamp ax ay az").and_then(|mut fields| {
@@ -40,7 +40,7 @@ pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<Acceleration>, Fo
             if found < previous {
                 return Err(Mistake::NotIncreasing { previous, found });
             }
-            Ok(Acceleration { timestamp: found, acceleration: fields.numbers::<3>()?.into() })
+            Ok(StampedAcceleration { timestamp: found, acceleration: fields.numbers::<3>()?.into() })
         });
         readings.extend(problems.ok(line, reading));
     }

@@ -15,7 +15,7 @@
 //! free. By default, the reader [holds](read) the pose of one camera and, for the scale, one direction of the
 //! camera that is farthest from it. This does not change the cost. Gauss-Newton requires it. Damped solvers
 //! do not, but report an undetermined direction at the end.
-use crate::error::{FormatError, Mistake, Problems};
+use crate::error::{FormatError, Mistake, ProblemList};
 use crate::graph_format::{GraphFormat, GraphRead};
 use crate::lines::{Fields, lines, number};
 use crate::text::read_text;
@@ -27,29 +27,29 @@ use std::path::Path;
 
 mod gauge;
 mod write;
-pub use write::{Omitted, format, write};
+pub use write::{BalOmissions, format, write};
 
 /// A problem from a file, with initial values for all its variables.
 #[derive(Debug, Clone, Default)]
-pub struct Bundle {
+pub struct BalProblem {
     /// Observations as factors, and held variables.
     pub graph: Graph,
     /// Cameras, then points, in file order.
     pub values: Values,
     /// Assumptions that the reader made.
-    pub report: Report,
+    pub report: BalReport,
 }
 
 /// Assumptions that the reader made.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Report {
+pub struct BalReport {
     /// Cameras with a held pose or direction, as the file does not fix the gauge.
     pub anchored: Vec<Key>,
     /// Cameras and points without any observation; they are held.
     pub unobserved: Vec<Key>,
 }
 
-impl Report {
+impl BalReport {
     /// Returns the assumptions as text.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
@@ -69,9 +69,9 @@ impl Report {
 crate::register_graph_format!(GraphFormat {
     name: "BAL",
     extensions: &["bal"],
-    begins,
+    begins: looks_like_bal,
     parse: |text, path, reading| {
-        let Bundle { graph, values, report } = parse(text, path, reading.anchor)?;
+        let BalProblem { graph, values, report } = parse(text, path, reading.anchor)?;
         Ok(GraphRead { graph, values, notes: report.notes() })
     },
     format: Some(|graph, values| {
@@ -81,15 +81,15 @@ crate::register_graph_format!(GraphFormat {
 });
 
 /// Numbers of cameras, points and observations from the first line.
-struct Counts([usize; 3]);
+struct BalCounts([usize; 3]);
 
-const CAMERA: usize = 9;
+const CAMERA_NUMBERS: usize = 9;
 /// Index of the focal length among a camera's numbers.
 const FOCAL_LENGTH: usize = 6;
-const POINT: usize = 3;
+const POINT_NUMBERS: usize = 3;
 
 /// Returns whether a text begins like a BAL file: with three whole numbers.
-pub fn begins(text: &str) -> bool {
+pub fn looks_like_bal(text: &str) -> bool {
     lines(text).next().is_some_and(|(_, line)| header(line).is_ok())
 }
 
@@ -98,7 +98,7 @@ pub fn begins(text: &str) -> bool {
 /// # Errors
 /// If a line is malformed, if an observation refers to an unknown camera or point, or if the numbers of lines
 /// and values differ from the counts in the first line. The error lists all mistakes.
-pub fn read(path: impl AsRef<Path>, anchor: bool) -> Result<Bundle, FormatError> {
+pub fn read(path: impl AsRef<Path>, anchor: bool) -> Result<BalProblem, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path, anchor)
 }
@@ -107,16 +107,16 @@ pub fn read(path: impl AsRef<Path>, anchor: bool) -> Result<Bundle, FormatError>
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(text: &str, path: impl AsRef<Path>, anchor: bool) -> Result<Bundle, FormatError> {
-    let mut problems = Problems::of(path.as_ref(), text);
+pub fn parse(text: &str, path: impl AsRef<Path>, anchor: bool) -> Result<BalProblem, FormatError> {
+    let mut problems = ProblemList::of(path.as_ref(), text);
     let mut lines = lines(text);
     let first = lines.next().unwrap_or((0, ""));
-    let counts = problems.ok(first.0, header(first.1)).unwrap_or(Counts([0; 3]));
+    let counts = problems.ok(first.0, header(first.1)).unwrap_or(BalCounts([0; 3]));
     if !problems.is_empty() {
         // Without the counts, the remaining lines cannot be interpreted.
-        return problems.finish().map(|()| Bundle::default());
+        return problems.finish().map(|()| BalProblem::default());
     }
-    let Counts([cameras, points, observations]) = counts;
+    let BalCounts([cameras, points, observations]) = counts;
     let mut seen = vec![];
     for (line, text) in lines.by_ref().take(observations) {
         let observation = observation(text, &counts);
@@ -128,7 +128,8 @@ pub fn parse(text: &str, path: impl AsRef<Path>, anchor: bool) -> Result<Bundle,
             numbers.push(problems.ok(line, number(word)).unwrap_or_default());
         }
     }
-    let expected = cameras.saturating_mul(CAMERA).saturating_add(points.saturating_mul(POINT));
+    let expected =
+        cameras.saturating_mul(CAMERA_NUMBERS).saturating_add(points.saturating_mul(POINT_NUMBERS));
     if problems.is_empty() && seen.len() != observations {
         let found = seen.len();
         problems.push(0, Mistake::Count { what: "lines of observations", expected: observations, found });
@@ -138,7 +139,7 @@ pub fn parse(text: &str, path: impl AsRef<Path>, anchor: bool) -> Result<Bundle,
     }
     // Focal lengths can be located only if the total count of numbers is right.
     let known = if problems.is_empty() { cameras } else { 0 };
-    for (i, camera) in numbers.chunks_exact(CAMERA).take(known).enumerate() {
+    for (i, camera) in numbers.chunks_exact(CAMERA_NUMBERS).take(known).enumerate() {
         let found = camera.get(FOCAL_LENGTH).copied().unwrap_or_default();
         if found <= 0.0 {
             let what = format!("camera {i}: expected a focal length above zero, got {found}");
@@ -146,23 +147,23 @@ pub fn parse(text: &str, path: impl AsRef<Path>, anchor: bool) -> Result<Bundle,
         }
     }
     problems.finish()?;
-    Ok(build(&seen, numbers.split_at(cameras * CAMERA), anchor))
+    Ok(build(&seen, numbers.split_at(cameras * CAMERA_NUMBERS), anchor))
 }
 
-fn header(text: &str) -> Result<Counts, Mistake> {
+fn header(text: &str) -> Result<BalCounts, Mistake> {
     let mut f = Fields::of(text, "cameras points observations")?;
     let mut count = || {
         let id = f.id()?;
         usize::try_from(id)
             .map_err(|_| Mistake::Field { expected: "a smaller number", found: id.to_string() })
     };
-    Ok(Counts([count()?, count()?, count()?]))
+    Ok(BalCounts([count()?, count()?, count()?]))
 }
 
 /// Indices of a camera and a point, and the measured pixel.
 type Observation = (usize, usize, Coordinates<2>);
 
-fn observation(text: &str, Counts([cameras, points, _]): &Counts) -> Result<Observation, Mistake> {
+fn observation(text: &str, BalCounts([cameras, points, _]): &BalCounts) -> Result<Observation, Mistake> {
     let mut f = Fields::of(text, "camera point x y")?;
     let mut below = |what, count: usize| {
         let id = f.id()?;
@@ -174,14 +175,14 @@ fn observation(text: &str, Counts([cameras, points, _]): &Counts) -> Result<Obse
 }
 
 #[allow(clippy::indexing_slicing, reason = "`observation` has checked the numbers")]
-fn build(seen: &[Observation], (cameras, points): (&[f64], &[f64]), anchor: bool) -> Bundle {
-    let mut bundle = Bundle::default();
-    let camera_keys: Vec<Key> = (0..cameras.len() / CAMERA).map(|i| Key::indexed("c", i)).collect();
-    let point_keys: Vec<Key> = (0..points.len() / POINT).map(|i| Key::indexed("p", i)).collect();
-    for (key, x) in camera_keys.iter().zip(cameras.as_chunks::<CAMERA>().0) {
+fn build(seen: &[Observation], (cameras, points): (&[f64], &[f64]), anchor: bool) -> BalProblem {
+    let mut bundle = BalProblem::default();
+    let camera_keys: Vec<Key> = (0..cameras.len() / CAMERA_NUMBERS).map(|i| Key::indexed("c", i)).collect();
+    let point_keys: Vec<Key> = (0..points.len() / POINT_NUMBERS).map(|i| Key::indexed("p", i)).collect();
+    for (key, x) in camera_keys.iter().zip(cameras.as_chunks::<CAMERA_NUMBERS>().0) {
         bundle.values.insert(key, camera(x));
     }
-    for (key, x) in point_keys.iter().zip(points.as_chunks::<POINT>().0) {
+    for (key, x) in point_keys.iter().zip(points.as_chunks::<POINT_NUMBERS>().0) {
         bundle.values.insert(key, Point3::new(*x));
     }
     let mut observed = vec![false; bundle.values.len()];
@@ -195,12 +196,12 @@ fn build(seen: &[Observation], (cameras, points): (&[f64], &[f64]), anchor: bool
         bundle.report.unobserved.push(key.clone());
     }
     if anchor {
-        bundle.report.anchored = gauge::hold(&mut bundle.graph, &bundle.values);
+        bundle.report.anchored = gauge::fix_gauge(&mut bundle.graph, &bundle.values);
     }
     bundle
 }
 
-fn camera(x: &[f64; CAMERA]) -> BalCamera {
+fn camera(x: &[f64; CAMERA_NUMBERS]) -> BalCamera {
     let &[rx, ry, rz, x, y, z, focal_length, k1, k2] = x;
     let camera_from_world = Se3::new(So3::exp(&Vector3::new(rx, ry, rz)), Vector3::new(x, y, z));
     BalCamera {

@@ -5,7 +5,7 @@
 //! with no object), `class_id`, `scores` (all classes with a score, as `cup:0.7;bowl:0.2`), and `depth`
 //! (depth of the object's centre along the optical axis, in m). A box without a class has an empty name and
 //! the score 0.
-use crate::error::{FormatError, Mistake, Problems, io_error};
+use crate::error::{FormatError, Mistake, ProblemList, io_error};
 use crate::text::read_text;
 use crate::whole::write_whole;
 use csv::{ReaderBuilder, StringRecord, Trim, Writer};
@@ -15,7 +15,7 @@ use std::path::Path;
 /// A row: one bounding box in one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Detection {
+pub struct DetectionRow {
     /// Index of the image, from 0.
     #[serde(default)]
     pub frame_idx: Option<u64>,
@@ -52,7 +52,7 @@ pub struct Detection {
 
 const REQUIRED: [&str; 7] = ["timestamp", "class_name", "score", "xmin", "ymin", "xmax", "ymax"];
 
-impl Detection {
+impl DetectionRow {
     /// Returns the classes with their scores: all of `scores`, otherwise the best alone. Empty for a box
     /// without a class.
     ///
@@ -105,7 +105,7 @@ impl Detection {
 ///
 /// # Errors
 /// If a row is malformed or a column is missing; the error lists all such rows.
-pub fn read(path: impl AsRef<Path>) -> Result<Vec<Detection>, FormatError> {
+pub fn read(path: impl AsRef<Path>) -> Result<Vec<DetectionRow>, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path)
 }
@@ -114,8 +114,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<Detection>, FormatError> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<Detection>, FormatError> {
-    let mut problems = Problems::of(path.as_ref(), text);
+pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<DetectionRow>, FormatError> {
+    let mut problems = ProblemList::of(path.as_ref(), text);
     let mut reader = ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
     let header = reader.headers().cloned().unwrap_or_default();
     let missing: Vec<_> = REQUIRED.into_iter().filter(|name| header.iter().all(|h| h != *name)).collect();
@@ -140,8 +140,8 @@ pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<Detection>, Forma
     problems.finish().map(|()| rows)
 }
 
-fn row(record: &StringRecord, header: &StringRecord) -> Result<Detection, Mistake> {
-    record.deserialize::<Detection>(Some(header)).map_err(|e| Mistake::Row(reason(&e, header)))?.check()
+fn row(record: &StringRecord, header: &StringRecord) -> Result<DetectionRow, Mistake> {
+    record.deserialize::<DetectionRow>(Some(header)).map_err(|e| Mistake::Row(reason(&e, header)))?.check()
 }
 
 /// Returns the line of a record. csv counts blank lines and comments before a record as part of it.
@@ -172,7 +172,7 @@ fn reason(e: &csv::Error, header: &StringRecord) -> String {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write(path: impl AsRef<Path>, detections: &[Detection]) -> Result<(), FormatError> {
+pub fn write(path: impl AsRef<Path>, detections: &[DetectionRow]) -> Result<(), FormatError> {
     let path = path.as_ref();
     let other = |e: csv::Error| FormatError::Io { path: path.to_owned(), source: e.into() };
     let mut writer = Writer::from_writer(vec![]);

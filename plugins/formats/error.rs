@@ -1,5 +1,5 @@
 //! Errors in files, with their position.
-use manifactor_geometry::{NoCoordinates, NotARotation};
+use manifactor_geometry::{CoordinatesError, RotationError};
 use manifactor_graph::ValueError;
 use manifactor_graph::noise::NoiseError;
 use std::fmt;
@@ -7,7 +7,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// Maximum number of reported problems per file; the remaining ones are only counted.
-const TOLD: usize = 20;
+const MAX_REPORTED: usize = 20;
 
 /// The reason why a file could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -72,10 +72,10 @@ pub enum Mistake {
     },
     /// A quaternion is not a rotation.
     #[error(transparent)]
-    Rotation(#[from] NotARotation),
+    Rotation(#[from] RotationError),
     /// A point has invalid coordinates.
     #[error(transparent)]
-    Coordinates(#[from] NoCoordinates),
+    Coordinates(#[from] CoordinatesError),
     /// A value has a different type than an edge requires.
     #[error(transparent)]
     Value(#[from] ValueError),
@@ -202,20 +202,20 @@ impl fmt::Display for Malformed {
 impl std::error::Error for Malformed {}
 
 /// Collector of problems while a file is read to its end.
-pub(crate) struct Problems<'a> {
+pub(crate) struct ProblemList<'a> {
     path: &'a Path,
     text: &'a str,
     list: Vec<BadLine>,
     more: usize,
 }
 
-impl<'a> Problems<'a> {
+impl<'a> ProblemList<'a> {
     /// Creates a collector for a file with this text.
     pub(crate) fn of(path: &'a Path, text: &'a str) -> Self {
         Self { path, text, list: vec![], more: 0 }
     }
     pub(crate) fn push(&mut self, line: usize, mistake: impl Into<Mistake>) {
-        if self.list.len() < TOLD {
+        if self.list.len() < MAX_REPORTED {
             self.list.push(BadLine { line, mistake: mistake.into() });
         } else {
             self.more += 1;

@@ -38,7 +38,7 @@ pub struct GraphFormat {
     /// Detects the format from the beginning of a text, for files with an unknown extension.
     pub begins: fn(&str) -> bool,
     /// Parses a text; the path is used only in errors.
-    pub parse: fn(&str, &Path, Reading) -> Result<GraphRead, FormatError>,
+    pub parse: fn(&str, &Path, ReadOptions) -> Result<GraphRead, FormatError>,
     /// Formats a graph as text. `None` for a read-only format.
     pub format: Option<GraphWriter>,
 }
@@ -50,9 +50,9 @@ pub type GraphWriter = fn(&Graph, &Values) -> (String, Vec<String>);
 
 /// Options for cases that a file leaves open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Reading {
+pub struct ReadOptions {
     /// Treatment of information matrices that are not positive definite.
-    pub repair: Repair,
+    pub repair: InformationRepair,
     /// Whether to hold a pose or a scale if the file does not fix the gauge.
     pub anchor: bool,
     /// Whether to skip lines that the format does not know.
@@ -62,7 +62,8 @@ pub struct Reading {
 /// Treatment of an information matrix that is not positive definite.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Repair {
+#[schemars(rename = "Repair")]
+pub enum InformationRepair {
     /// Report an error with its line.
     #[default]
     Error,
@@ -92,15 +93,15 @@ impl GraphFormat {
     }
 
     /// Returns the format with the file's extension.
-    pub fn of_path(path: &Path) -> Option<&'static Self> {
+    pub fn by_extension(path: &Path) -> Option<&'static Self> {
         let extension = path.extension()?.to_str()?.to_lowercase();
         Self::all().into_iter().find(|format| format.extensions.contains(&extension.as_str()))
     }
 
     /// Returns the format with the file's extension, otherwise the format that matches the beginning of the
     /// text.
-    pub fn of(path: &Path, text: &str) -> Option<&'static Self> {
-        Self::of_path(path).or_else(|| Self::all().into_iter().find(|format| (format.begins)(text)))
+    pub fn detect(path: &Path, text: &str) -> Option<&'static Self> {
+        Self::by_extension(path).or_else(|| Self::all().into_iter().find(|format| (format.begins)(text)))
     }
 }
 

@@ -20,7 +20,7 @@ pub mod tum;
 pub mod whole;
 
 pub use error::{BadLine, FormatError, Malformed, Mistake};
-pub use graph_format::{GraphFormat, GraphRead, GraphWriter, Reading, Repair};
+pub use graph_format::{GraphFormat, GraphRead, GraphWriter, InformationRepair, ReadOptions};
 pub use pose_graph::g2o;
 pub use text::{STDIN, plausible, read_text, words};
 pub use whole::journal;

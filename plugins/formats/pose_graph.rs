@@ -3,14 +3,14 @@
 //! Poses get the keys `x<id>`, landmarks `l<id>`. Edges become `between_se2`, `between_se3` and landmark
 //! factors with the file's information as noise. The reader completes the following and reports it:
 //! - vertices without a line get initial values along a spanning tree of the edges, of the kind in
-//!   [`Options::tree`];
+//!   [`PoseGraphOptions::tree`];
 //! - an `EQUIV a b` line declares that two poses are one place, as far as the edge between them says so (TORO
 //!   merges the two by that edge). The edge is already in the graph, so no factor is added. Without an edge,
-//!   a relative pose of zero with [`Options::equivalence_sigma`] connects the two;
-//! - in each connected part without a `FIX` line, the first pose is held, unless [`Options::anchor`] is
+//!   a relative pose of zero with [`PoseGraphOptions::equivalence_sigma`] connects the two;
+//! - in each connected part without a `FIX` line, the first pose is held, unless [`PoseGraphOptions::anchor`] is
 //!   false.
-use crate::error::{FormatError, Mistake, Problems};
-use crate::graph_format::{GraphFormat, GraphRead, Reading};
+use crate::error::{FormatError, Mistake, ProblemList};
+use crate::graph_format::{GraphFormat, GraphRead, ReadOptions};
 use crate::lines::lines;
 use crate::text::read_text;
 use crate::words::{count, list};
@@ -30,7 +30,7 @@ mod information;
 pub(crate) mod record;
 mod toro;
 
-pub use crate::graph_format::Repair;
+pub use crate::graph_format::InformationRepair;
 use record::Record;
 
 crate::register_graph_format!(GraphFormat {
@@ -38,8 +38,8 @@ crate::register_graph_format!(GraphFormat {
     extensions: &["g2o", "toro", "graph"],
     begins: |text| lines(text).next().is_some_and(|(_, line)| parser(tag_of(line).0).is_some()),
     parse: |text, path, reading| {
-        let Reading { repair, anchor, lenient } = reading;
-        let options = Options { repair, anchor, lenient, ..Options::default() };
+        let ReadOptions { repair, anchor, lenient } = reading;
+        let options = PoseGraphOptions { repair, anchor, lenient, ..PoseGraphOptions::default() };
         let PoseGraph { graph, values, report } = parse(text, path, &options)?;
         Ok(GraphRead { graph, values, notes: report.notes() })
     },
@@ -57,15 +57,16 @@ pub struct PoseGraph {
     /// Vertices in file order, then vertices that occur only in edges, sorted by number.
     pub values: Values,
     /// Assumptions that the reader made.
-    pub report: Report,
+    pub report: PoseGraphReport,
 }
 
 /// Options for cases that a file leaves open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Options {
+#[schemars(rename = "Options")]
+pub struct PoseGraphOptions {
     /// Treatment of information matrices that are not positive definite.
-    pub repair: Repair,
+    pub repair: InformationRepair,
     /// Hold the first pose of each connected part that is not held otherwise.
     pub anchor: bool,
     /// Skip lines with unknown tags. Otherwise they are an error, because the graph would be incomplete.
@@ -76,10 +77,10 @@ pub struct Options {
     pub equivalence_sigma: Positive,
 }
 
-impl Default for Options {
+impl Default for PoseGraphOptions {
     fn default() -> Self {
         Self {
-            repair: Repair::Error,
+            repair: InformationRepair::Error,
             anchor: true,
             lenient: false,
             tree: Tree::Chain,
@@ -90,7 +91,7 @@ impl Default for Options {
 
 /// Assumptions and repairs that the reader made.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Report {
+pub struct PoseGraphReport {
     /// Number of vertex lines.
     pub vertices: usize,
     /// Number of edge lines, including omitted edges.
@@ -101,9 +102,9 @@ pub struct Report {
     pub anchored: Vec<Key>,
     /// Unknown tags with their number of lines. These lines are omitted.
     pub unknown: BTreeMap<String, usize>,
-    /// Lines of edges omitted by [`Repair`].
+    /// Lines of edges omitted by [`InformationRepair`].
     pub rejected: Vec<usize>,
-    /// Lines of edges whose information was changed by [`Repair::Clamp`].
+    /// Lines of edges whose information was changed by [`InformationRepair::Clamp`].
     pub clamped: Vec<usize>,
     /// Number of `EQUIV` lines whose two poses have an edge between them.
     pub equivalences_by_edge: usize,
@@ -113,12 +114,12 @@ pub struct Report {
     pub doubts: Vec<String>,
 }
 
-impl Report {
+impl PoseGraphReport {
     /// Returns the assumptions and repairs as text.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         for (tag, n) in self.unknown.iter().take(SHOWN_TAGS) {
-            notes.push(format!("unknown tag {}: {} left out", shown(tag), count(*n, "line")));
+            notes.push(format!("unknown tag {}: {} left out", shorten_tag(tag), count(*n, "line")));
         }
         if self.unknown.len() > SHOWN_TAGS {
             let rest: usize = self.unknown.values().skip(SHOWN_TAGS).sum();
@@ -157,9 +158,9 @@ impl Report {
 const SHOWN_TAGS: usize = 10;
 
 /// Returns a tag in backquotes, shortened for messages.
-fn shown(tag: &str) -> String {
-    const LONGEST: usize = 40;
-    let start: String = tag.chars().take(LONGEST).collect();
+fn shorten_tag(tag: &str) -> String {
+    const MAX_TAG_CHARS: usize = 40;
+    let start: String = tag.chars().take(MAX_TAG_CHARS).collect();
     if start.len() < tag.len() { format!("`{start}…`") } else { format!("`{tag}`") }
 }
 
@@ -179,8 +180,8 @@ fn parser(tag: &str) -> Option<record::Parse> {
 /// If a line is malformed, or if a vertex is defined twice, used with a different type or fixed without a
 /// definition. If an edge connects a vertex with itself, or if an information matrix is not positive definite
 /// and not repaired. If there is no vertex or edge, or if there are unknown tags without
-/// [`Options::lenient`]. The error lists all mistakes.
-pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<PoseGraph, FormatError> {
+/// [`PoseGraphOptions::lenient`]. The error lists all mistakes.
+pub fn read(path: impl AsRef<Path>, options: &PoseGraphOptions) -> Result<PoseGraph, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path, options)
 }
@@ -189,8 +190,12 @@ pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<PoseGraph, Form
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<PoseGraph, FormatError> {
-    let mut problems = Problems::of(path.as_ref(), text);
+pub fn parse(
+    text: &str,
+    path: impl AsRef<Path>,
+    options: &PoseGraphOptions,
+) -> Result<PoseGraph, FormatError> {
+    let mut problems = ProblemList::of(path.as_ref(), text);
     let mut unknown = BTreeMap::<String, usize>::new();
     let (mut records, mut first_unknown): (Vec<(usize, Record)>, Option<usize>) = (vec![], None);
     for (line, text) in lines(text) {
@@ -207,11 +212,11 @@ pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<Po
         }
     }
     if records.is_empty() && problems.is_empty() {
-        let unknown = unknown.keys().take(SHOWN_TAGS).map(|tag| shown(tag)).collect();
+        let unknown = unknown.keys().take(SHOWN_TAGS).map(|tag| shorten_tag(tag)).collect();
         problems.push(0, Mistake::Empty { expected: "vertices or edges of a g2o or TORO file", unknown });
     }
     if !options.lenient && !records.is_empty() && !unknown.is_empty() {
-        let tags = unknown.keys().take(SHOWN_TAGS).map(|tag| shown(tag)).collect();
+        let tags = unknown.keys().take(SHOWN_TAGS).map(|tag| shorten_tag(tag)).collect();
         problems.push(
             first_unknown.unwrap_or_default(),
             Mistake::UnknownTags { lines: unknown.values().sum(), tags },
@@ -221,7 +226,7 @@ pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<Po
     problems.finish()?;
     let mut built = built.unwrap_or_default();
     built.report.unknown = unknown;
-    let Report { vertices, edges, filled, rejected, clamped, .. } = &built.report;
+    let PoseGraphReport { vertices, edges, filled, rejected, clamped, .. } = &built.report;
     let (filled, rejected, clamped) = (filled.len(), rejected.len(), clamped.len());
     tracing::info!(vertices, edges, filled, rejected, clamped, "pose graph");
     Ok(built)

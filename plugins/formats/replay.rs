@@ -13,9 +13,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 
 /// A graph, step by step.
 #[derive(Debug, Clone)]
-pub struct Replay {
+pub struct GraphReplay {
     steps: VecDeque<Vec<FactorEntry>>,
-    waiting: Waiting,
+    waiting: WaitingFactors,
     known: HashSet<Key>,
     /// Held variables that no step has returned yet.
     fixed: Graph,
@@ -25,7 +25,7 @@ pub struct Replay {
 
 /// The content of one step: factors, and the initial values of their new variables.
 #[derive(Debug, Clone, Default)]
-pub struct Step {
+pub struct ReplayStep {
     /// New factors. New variables that the whole graph holds are held here too.
     pub factors: Graph,
     /// Initial values of the new variables. A held variable has its value in the file. Any other variable is
@@ -53,7 +53,7 @@ fn number(key: &Key) -> Option<u64> {
     key.as_str().strip_prefix('x')?.parse().ok()
 }
 
-impl Replay {
+impl GraphReplay {
     /// Splits a graph with these initial values into steps; there are none if it has no poses.
     pub fn of(graph: &Graph, initial: &Values) -> Self {
         let poses = |entry: &FactorEntry| entry.keys.iter().filter_map(number).collect::<Vec<_>>();
@@ -75,7 +75,7 @@ impl Replay {
         graph.fixed().iter().for_each(|(key, held)| fixed.set_fixed(key, held.clone()));
         Self {
             steps: steps.into_values().collect(),
-            waiting: Waiting::default(),
+            waiting: WaitingFactors::default(),
             known: HashSet::new(),
             fixed,
             initial: initial.clone(),
@@ -100,12 +100,12 @@ impl Replay {
     pub fn step(
         &mut self,
         estimate: impl Fn(&str) -> Option<Box<dyn Variable>>,
-    ) -> Result<Option<Step>, ValueError> {
+    ) -> Result<Option<ReplayStep>, ValueError> {
         let Some(new) = self.steps.pop_front() else { return Ok(None) };
         new.into_iter().for_each(|entry| self.waiting.push(entry, &self.known));
-        let (factors, keys) = self.reach();
+        let (factors, keys) = self.mark_reached();
         let mut values = Values::new();
-        let mut step = Step::default();
+        let mut step = ReplayStep::default();
         let mut graph = Graph::new();
         for entry in factors {
             graph.push(entry);
@@ -143,13 +143,13 @@ impl Replay {
     /// Removes and returns the waiting factors that are reachable from known variables, one after another,
     /// and the new variables in order. The first factor needs no known variable, nor do the remaining ones in
     /// the last step.
-    fn reach(&mut self) -> (Vec<FactorEntry>, Vec<Key>) {
+    fn mark_reached(&mut self) -> (Vec<FactorEntry>, Vec<Key>) {
         let (mut factors, mut keys) = (vec![], vec![]);
         while let Some(entry) = self.waiting.next(self.known.is_empty() || self.steps.is_empty()) {
             for key in &entry.keys {
                 if self.known.insert(key.clone()) {
                     keys.push(key.clone());
-                    self.waiting.tell(key);
+                    self.waiting.mark_known(key);
                 }
             }
             factors.push(entry);
@@ -160,7 +160,7 @@ impl Replay {
 
 /// Factors that have arrived but were not returned yet. The first one with a known variable is next.
 #[derive(Debug, Clone, Default)]
-struct Waiting {
+struct WaitingFactors {
     /// By number, in order of arrival.
     factors: BTreeMap<usize, FactorEntry>,
     reached: BTreeSet<usize>,
@@ -169,7 +169,7 @@ struct Waiting {
     numbers: usize,
 }
 
-impl Waiting {
+impl WaitingFactors {
     fn push(&mut self, entry: FactorEntry, known: &HashSet<Key>) {
         let number = self.numbers;
         self.numbers += 1;
@@ -184,7 +184,7 @@ impl Waiting {
     }
 
     /// Marks a variable as known.
-    fn tell(&mut self, key: &Key) {
+    fn mark_known(&mut self, key: &Key) {
         let factors = self.by_key.remove(key).unwrap_or_default();
         self.reached.extend(factors.into_iter().filter(|number| self.factors.contains_key(number)));
     }
@@ -242,7 +242,7 @@ mod tests {
         graph.add(["x0", "x1"], Between { relative: at(1.0) });
         graph.add(["x1", "x2"], Between { relative: at(1.0) });
         graph.fix("x2");
-        let (mut replay, mut known) = (Replay::of(&graph, &initial), Values::new());
+        let (mut replay, mut known) = (GraphReplay::of(&graph, &initial), Values::new());
         while let Some(step) = replay.step(|key| known.variable(key).map(|v| v.erased().clone_box())).unwrap()
         {
             for (key, value) in step.values.iter() {
@@ -264,7 +264,7 @@ mod tests {
         [("x0", "x1"), ("x1", "x2"), ("x3", "m"), ("m", "x4"), ("x2", "x5"), ("x4", "x5")]
             .into_iter()
             .for_each(|(a, b)| link(a, b));
-        let mut replay = Replay::of(&graph, &Values::new());
+        let mut replay = GraphReplay::of(&graph, &Values::new());
         let mut told: Vec<Vec<String>> = vec![];
         let mut known = Values::new();
         while let Some(step) = replay.step(|key| known.variable(key).map(|v| v.erased().clone_box())).unwrap()

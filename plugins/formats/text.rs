@@ -2,7 +2,7 @@
 pub mod plausible;
 pub mod words;
 
-use crate::error::{FormatError, Mistake, Problems, io_error};
+use crate::error::{FormatError, Mistake, ProblemList, io_error};
 use crate::whole::write_whole;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Maximum number of bytes from a pipe or a device, whose length is unknown: the maximum size of a document.
 /// A regular file may be longer.
-const STREAM: u64 = 256 << 20;
+const MAX_STREAM_BYTES: u64 = 256 << 20;
 
 /// The path that stands for standard input.
 pub const STDIN: &str = "-";
@@ -26,7 +26,7 @@ pub fn read_text(path: &Path) -> Result<String, FormatError> {
         // The valid part of the content is shown.
         let text = String::from_utf8_lossy(error.as_bytes());
         let good = error.as_bytes().iter().take(error.utf8_error().valid_up_to());
-        let mut problems = Problems::of(path, &text);
+        let mut problems = ProblemList::of(path, &text);
         problems.push(1 + good.filter(|b| **b == b'\n').count(), Mistake::NotText);
         problems.into_error()
     })
@@ -38,13 +38,13 @@ pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), FormatError> {
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
     if path == Path::new(STDIN) {
-        return read_bounded(io::stdin().lock(), 0, STREAM);
+        return read_bounded(io::stdin().lock(), 0, MAX_STREAM_BYTES);
     }
     let file = File::open(path)?;
     let about = file.metadata()?;
     let length = if about.is_file() { about.len() } else { 0 };
     // System files such as in /proc report a length of zero.
-    read_bounded(file, length, length.max(STREAM))
+    read_bounded(file, length, length.max(MAX_STREAM_BYTES))
 }
 
 /// Reads up to the end, with `length` bytes reserved; fails if there are more than `limit` bytes.

@@ -1,8 +1,8 @@
 //! Lists of images in TUM RGB-D format: `timestamp filename`, one image per line (`rgb.txt`).
-use crate::error::{FormatError, Problems};
+use crate::error::{FormatError, ProblemList};
 use crate::lines::{Fields, lines};
 use crate::text::read_text;
-use crate::tum::increasing;
+use crate::tum::check_increasing;
 use std::path::Path;
 
 /// An image file with its timestamp.
@@ -28,13 +28,13 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<StampedFile>, FormatError> {
 /// # Errors
 /// As [`read`].
 pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<StampedFile>, FormatError> {
-    let mut problems = Problems::of(path.as_ref(), text);
+    let mut problems = ProblemList::of(path.as_ref(), text);
     let mut list: Vec<StampedFile> = vec![];
     for (line, text) in lines(text) {
         let previous = list.last().map(|f| f.timestamp);
         let file = Fields::of(text, "timestamp filename").and_then(|mut fields| {
             let timestamp = fields.number()?;
-            increasing(previous, timestamp)?;
+            check_increasing(previous, timestamp)?;
             Ok(StampedFile { timestamp, file: fields.text().to_owned() })
         });
         list.extend(problems.ok(line, file));

@@ -3,7 +3,7 @@
 //! Seconds, metres and a unit quaternion; the pose is `world_from_camera`. Timestamps must increase, with two
 //! exceptions that published files need. A line that is late by at most 0.05 s is moved to its place. Of two
 //! lines with equal timestamps, the first is used. Both cases are reported.
-use crate::error::{FormatError, Mistake, Problems};
+use crate::error::{FormatError, Mistake, ProblemList};
 use crate::lines::{Fields, lines};
 use crate::text::{read_text, write_text};
 use manifactor_geometry::{Se3, So3};
@@ -20,7 +20,7 @@ pub struct StampedPose {
 }
 
 /// Maximum lateness of a line relative to the previous one, in seconds.
-pub(crate) const LATE: f64 = 0.05;
+pub(crate) const MAX_LATENESS_S: f64 = 0.05;
 
 /// A trajectory, and the repairs that its file needed.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -49,7 +49,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Trajectory, FormatError> {
 /// # Errors
 /// As [`read`].
 pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Trajectory, FormatError> {
-    let mut problems = Problems::of(path.as_ref(), text);
+    let mut problems = ProblemList::of(path.as_ref(), text);
     let mut trajectory = Trajectory::default();
     let mut empty = true;
     for (line, text) in lines(text) {
@@ -67,7 +67,7 @@ pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Trajectory, FormatErr
 impl Trajectory {
     fn add(&mut self, line: usize, pose: StampedPose) -> Result<(), Mistake> {
         let latest = self.poses.last().map_or(f64::NEG_INFINITY, |p| p.timestamp);
-        if pose.timestamp < latest - LATE {
+        if pose.timestamp < latest - MAX_LATENESS_S {
             return Err(Mistake::NotIncreasing { previous: latest, found: pose.timestamp });
         }
         let place = self.poses.partition_point(|p| p.timestamp < pose.timestamp);
@@ -95,7 +95,7 @@ pub(crate) fn pose(fields: &mut Fields<'_>) -> Result<Se3, Mistake> {
     Ok(Se3::new(So3::from_quaternion_xyzw(fields.numbers()?)?, translation))
 }
 
-pub(crate) fn increasing(previous: Option<f64>, found: f64) -> Result<(), Mistake> {
+pub(crate) fn check_increasing(previous: Option<f64>, found: f64) -> Result<(), Mistake> {
     match previous {
         Some(previous) if found <= previous => Err(Mistake::NotIncreasing { previous, found }),
         _ => Ok(()),

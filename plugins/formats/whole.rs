@@ -8,11 +8,11 @@ use std::path::Path;
 use tempfile::{Builder, NamedTempFile};
 
 /// Prefix of the name of an unfinished file.
-const PREFIX: &str = ".manifactor-";
+const UNFINISHED_PREFIX: &str = ".manifactor-";
 /// Number of random letters and digits in the name.
-const RANDOM: usize = 16;
+const RANDOM_CHARS: usize = 16;
 /// Suffix of the name.
-const SUFFIX: &str = ".unfinished";
+const UNFINISHED_SUFFIX: &str = ".unfinished";
 
 /// Writes a file atomically: writes to a temporary file in the same folder, syncs it to the disk, and renames
 /// it. A replaced file keeps its permissions. A link is replaced; its target is left unchanged.
@@ -29,7 +29,7 @@ pub fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
 ///
 /// # Errors
 /// If the file cannot be written, with the error of the operating system.
-pub fn can_write(path: &Path) -> io::Result<()> {
+pub fn check_writable(path: &Path) -> io::Result<()> {
     if path.is_dir() {
         return Err(ErrorKind::IsADirectory.into());
     }
@@ -44,8 +44,9 @@ pub fn can_write(path: &Path) -> io::Result<()> {
 pub fn remove_unfinished(folder: &Path) {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let is_ours = |name: &str| {
-        let random = name.strip_prefix(PREFIX).and_then(|rest| rest.strip_suffix(SUFFIX));
-        random.is_some_and(|r| r.len() == RANDOM && r.bytes().all(|b| b.is_ascii_alphanumeric()))
+        let random =
+            name.strip_prefix(UNFINISHED_PREFIX).and_then(|rest| rest.strip_suffix(UNFINISHED_SUFFIX));
+        random.is_some_and(|r| r.len() == RANDOM_CHARS && r.bytes().all(|b| b.is_ascii_alphanumeric()))
     };
     for file in files.filter(|file| file.file_name().to_str().is_some_and(is_ours)) {
         if file.file_type().is_ok_and(|t| t.is_file()) {
@@ -122,7 +123,7 @@ fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
 fn unfinished(path: &Path, replaced: Option<&Metadata>) -> io::Result<NamedTempFile<File>> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = Builder::new();
-    builder.prefix(PREFIX).rand_bytes(RANDOM).suffix(SUFFIX);
+    builder.prefix(UNFINISHED_PREFIX).rand_bytes(RANDOM_CHARS).suffix(UNFINISHED_SUFFIX);
     builder.make_in(folder, |path| create(path, replaced))
 }
 
@@ -141,22 +142,22 @@ fn create(path: &Path, replaced: Option<&Metadata>) -> io::Result<File> {
 }
 
 /// Number of hexadecimal digits of a checksum.
-const DIGITS: usize = 16;
+const CHECKSUM_DIGITS: usize = 16;
 
 fn checksum(text: &[u8]) -> String {
     let mut hash = fnv::FnvHasher::default();
     hash.write(text);
-    format!("{:0DIGITS$x}", hash.finish())
+    format!("{:0CHECKSUM_DIGITS$x}", hash.finish())
 }
 
 /// Beginning of a line with a checksum.
-pub const CHECKED: &str = r#"{"checksum":""#;
+pub const CHECKED_LINE_START: &str = r#"{"checksum":""#;
 
 /// Returns a log line, with its line break: a JSON object with a checksum as its first field (64-bit FNV-1a
 /// of the object without the checksum). The checksum detects damaged bytes when a log is read again after
 /// months.
 pub fn checked_line(object: &str) -> String {
-    format!("{CHECKED}{}\",{}\n", checksum(object.as_bytes()), object.get(1..).unwrap_or_default())
+    format!("{CHECKED_LINE_START}{}\",{}\n", checksum(object.as_bytes()), object.get(1..).unwrap_or_default())
 }
 
 /// Returns the object of a line with a checksum, given without its line break.
@@ -164,7 +165,9 @@ pub fn checked_line(object: &str) -> String {
 /// # Errors
 /// If there is no checksum or it does not match, with the reason as text.
 pub fn read_checked_line(line: &[u8]) -> Result<Vec<u8>, &'static str> {
-    let rest = line.strip_prefix(CHECKED.as_bytes()).and_then(|rest| rest.split_at_checked(DIGITS));
+    let rest = line
+        .strip_prefix(CHECKED_LINE_START.as_bytes())
+        .and_then(|rest| rest.split_at_checked(CHECKSUM_DIGITS));
     let parts = rest.and_then(|(sum, rest)| Some((sum, rest.strip_prefix(br#"","#)?)));
     let (sum, rest) = parts.ok_or("the line has no checksum: it is damaged, or of an earlier version")?;
     let object = [b"{", rest].concat();
@@ -204,9 +207,9 @@ mod tests {
         let place = folder.path().join("not a folder");
         std::fs::write(&place, "").unwrap();
         assert!(write_whole(&place.join("a.txt"), b"text").is_err());
-        assert!(can_write(&folder.path().join("new/a.txt")).is_err());
-        assert!(can_write(folder.path()).is_err() && write_whole(folder.path(), b"text").is_err());
-        assert!(can_write(&folder.path().join("a.txt")).is_ok());
+        assert!(check_writable(&folder.path().join("new/a.txt")).is_err());
+        assert!(check_writable(folder.path()).is_err() && write_whole(folder.path(), b"text").is_err());
+        assert!(check_writable(&folder.path().join("a.txt")).is_ok());
         assert_eq!(names(folder.path()), ["not a folder"]);
     }
 
@@ -275,7 +278,7 @@ mod tests {
             let folder = tempdir().unwrap();
             let link = folder.path().join("null.json");
             symlink("/dev/null", &link).unwrap();
-            can_write(&link).unwrap();
+            check_writable(&link).unwrap();
             write_whole(&link, b"text").unwrap();
             assert!(link.symlink_metadata().unwrap().is_symlink());
             assert!(open_regular(Path::new("/dev/null")).is_err());

@@ -7,7 +7,7 @@ mod projection_bal;
 mod radial_tangential;
 
 pub use bal_camera::BalCamera;
-pub use camera::{Camera, NotACamera};
+pub use camera::{Camera, CameraError};
 pub use camera_model::{AnyCamera, CameraModel};
 pub use projection::Projection;
 pub use projection_bal::ProjectionBal;

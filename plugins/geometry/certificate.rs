@@ -11,7 +11,7 @@
 //! translation. The lower bound then holds for the graph's cost too. With any other noise, the graph's cost
 //! has no bound.
 use crate::initialise::network::{Edge, Network};
-use crate::initialise::parts::Parts;
+use crate::initialise::parts::ConnectedSets;
 use crate::initialise::pose::Pose;
 use crate::{Between, ChordalBetween, Prior, Se2, Se3};
 use dual::{Dual, Weights};
@@ -50,7 +50,7 @@ pub struct Certificate {
 }
 
 /// Largest shift of the smallest eigenvalue that counts as rounding.
-const ZERO: f64 = 1e-9;
+const ROUNDING_SHIFT: f64 = 1e-9;
 
 /// The reason why a graph has no certificate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -138,7 +138,7 @@ where
         let (factor, name) = other.map_or((0, ""), |(i, entry)| (i, entry.factor.typetag_name()));
         return Err(CertificateError::OtherFactor { factor, name });
     }
-    check_held(&net, graph, values)?;
+    check_fixed(&net, graph, values)?;
     let mut isotropic = true;
     let mut edges = vec![];
     for edge in &net.edges {
@@ -158,7 +158,7 @@ where
     let (smallest_eigenvalue, shift) = dual.smallest_eigenvalue().ok_or(CertificateError::Conditioning)?;
     let lower_bound = dual.lower_bound(shift).max(0.0);
     Ok(Some(Certificate {
-        certified: shift <= ZERO,
+        certified: shift <= ROUNDING_SHIFT,
         chordal_cost: dual.cost,
         lower_bound,
         suboptimality: (dual.cost - lower_bound).max(0.0),
@@ -168,7 +168,7 @@ where
 }
 
 /// Checks that the graph holds no more than the gauge of each connected part.
-fn check_held<P: Pose<D>, const D: usize>(
+fn check_fixed<P: Pose<D>, const D: usize>(
     net: &Network<P, D>,
     graph: &Graph,
     values: &Values,
@@ -178,7 +178,7 @@ fn check_held<P: Pose<D>, const D: usize>(
         return Err(CertificateError::Held { key: key.clone() });
     }
     let n = net.poses.len();
-    let mut parts = Parts::new(n);
+    let mut parts = ConnectedSets::new(n);
     net.edges.iter().for_each(|e| parts.join(e.a, e.b));
     let mut part_is_held = vec![false; n];
     for i in (0..n).filter(|i| net.held[*i]) {

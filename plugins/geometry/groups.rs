@@ -10,15 +10,15 @@ mod so2;
 mod so3;
 mod twist;
 
-pub use coordinates::{Coordinates, NoCoordinates};
+pub use coordinates::{Coordinates, CoordinatesError};
 pub use lie_group::LieGroup;
 pub use rn::{Point1, Point2, Point3, Rn};
 pub use se2::Se2;
 pub use se3::Se3;
-pub use so2::{NotAnAngle, So2, atan2, wrap};
-pub use so3::{NotARotation, So3};
+pub use so2::{AngleError, So2, atan2, wrap};
+pub use so3::{RotationError, So3};
 pub use twist::Twist;
 
-pub(crate) use se2::quarter;
+pub(crate) use se2::quarter_turn;
 pub(crate) use so2::Angle;
 pub(crate) use so3::{Xyzw, jet};

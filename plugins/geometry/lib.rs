@@ -5,7 +5,7 @@
 //! one.
 #[doc(hidden)]
 pub mod __private {
-    pub use crate::bundle::camera_model::rectify;
+    pub use crate::bundle::camera_model::{ProjectionName, rectify};
     pub use manifactor_graph;
     pub use nalgebra::Vector2;
 }
@@ -21,7 +21,7 @@ mod procrustes;
 pub mod testing;
 
 pub use bundle::{
-    AnyCamera, BalCamera, Camera, CameraModel, NotACamera, Projection, ProjectionBal, RadialTangential,
+    AnyCamera, BalCamera, Camera, CameraError, CameraModel, Projection, ProjectionBal, RadialTangential,
 };
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{
@@ -29,7 +29,7 @@ pub use factors::{
     Prior, Range,
 };
 pub use groups::{
-    Coordinates, LieGroup, NoCoordinates, NotARotation, NotAnAngle, Point1, Point2, Point3, Rn, Se2, Se3,
+    AngleError, Coordinates, CoordinatesError, LieGroup, Point1, Point2, Point3, Rn, RotationError, Se2, Se3,
     So2, So3, Twist, atan2, wrap,
 };
 pub use initialise::{Chordal, SpanningTree, Tree, spanning_tree};

@@ -14,7 +14,7 @@ pub struct NearestRotation {
 }
 
 /// Maximum number of sweeps over the three pairs of columns; four or five are typical.
-const SWEEPS: usize = 30;
+const MAX_SWEEPS: usize = 30;
 
 /// Finds the rotation closest to a matrix (Kabsch, 1976; Umeyama, 1991, equation 40).
 ///
@@ -23,7 +23,7 @@ const SWEEPS: usize = 30;
 /// nearly straight trajectory would then be rotated about its direction by a wrong angle.
 pub fn nearest_rotation(matrix: &Matrix3<f64>) -> NearestRotation {
     let (mut a, mut v) = (*matrix, Matrix3::identity());
-    for _ in 0..SWEEPS {
+    for _ in 0..MAX_SWEEPS {
         let mut is_done = true;
         for (i, j) in [(0, 1), (0, 2), (1, 2)] {
             let (alpha, beta) = (a.column(i).norm_squared(), a.column(j).norm_squared());

@@ -3,12 +3,12 @@ use crate::errors;
 use crate::solution::Watch;
 use crate::threads::detach;
 use manifactor::config::{Diagnostics, Document, Format};
-use manifactor::slam::experiment::{self, Experiment, Progress, Shard, Trial, TrialLog};
+use manifactor::slam::experiment::{self, Experiment, ExperimentProgress, Shard, Trial, TrialLog};
 use manifactor::slam::output::OutputFolder;
 use manifactor::slam::record::{RunRecord, VariantRecord};
 use manifactor::slam::run::Run;
 use manifactor::slam::run_document::RunDocument;
-use manifactor::slam::source::Folders;
+use manifactor::slam::source::InputFolders;
 use manifactor::solve::Interrupt;
 use manifactor::viz::run_page;
 use manifactor_cli::{Failure, write_experiment};
@@ -54,7 +54,7 @@ fn run(
         let mut run = Run::new(&document, data);
         let (mut records, mut configs) = (vec![], vec![]);
         for variant in &document.variants {
-            let (estimate, _) = run.variant(variant, &mut watch).map_err(|error| error.to_string())?;
+            let (estimate, _) = run.run_variant(variant, &mut watch).map_err(|error| error.to_string())?;
             records.push(VariantRecord::new(variant, &estimate));
             configs.push(manifactor::config::to_toml(&variant.settings).map_err(|error| error.to_string())?);
         }
@@ -93,12 +93,12 @@ fn experiment_of(
     let shard = shard.map(|shard| shard.parse::<Shard>()).transpose();
     let shard = shard.map_err(|error| errors::argument("experiment", "shard", error))?;
     if let Some(shard) = shard {
-        sweep.keep(shard);
+        sweep.restrict_to_shard(shard);
     }
-    let folders = Folders { data, document: sweep.folder.clone() };
+    let folders = InputFolders { data, document: sweep.folder.clone() };
     let interrupt = Interrupt::default();
     let mut raised = None;
-    let show = |now: Progress| {
+    let show = |now: ExperimentProgress| {
         let shown = Python::attach(|py| {
             py.check_signals()?;
             progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (now.done, now.trials)).map(drop))
@@ -135,7 +135,7 @@ struct Sweep {
     sweep: Experiment,
     /// Text of the document.
     text: String,
-    folders: Folders,
+    folders: InputFolders,
     journal: Option<TrialLog>,
 }
 
@@ -157,7 +157,7 @@ impl Sweep {
         if let Some(out) = out {
             sweep.output = out;
         }
-        let folders = Folders { data, document: sweep.folder.clone() };
+        let folders = InputFolders { data, document: sweep.folder.clone() };
         let journal = is_driver.then(|| {
             let claimed =
                 OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(errors::failure)?;
@@ -176,7 +176,7 @@ impl Sweep {
     /// Returns the numbers of the unfinished trials.
     fn open(&self) -> Vec<usize> {
         let is_open =
-            |trial: &Trial| self.journal.as_ref().is_none_or(|journal| journal.find(trial).is_none());
+            |trial: &Trial| self.journal.as_ref().is_none_or(|journal| journal.record_of(trial).is_none());
         self.sweep.trials.iter().enumerate().filter(|(_, trial)| is_open(trial)).map(|(i, _)| i).collect()
     }
 
@@ -186,7 +186,7 @@ impl Sweep {
             return Err(errors::argument("Sweep.run", "number", format!("there is no trial {number}")));
         };
         let mut watch = Watch::new(None);
-        let record = detach(py, || experiment::alone(trial, &self.folders, &mut watch))?;
+        let record = detach(py, || experiment::run_single_threaded(trial, &self.folders, &mut watch))?;
         watch.finish()?;
         let record = record.ok_or_else(|| errors::solve("the trial was interrupted"))?;
         serde_json::to_string(&record).map_err(errors::internal)

@@ -9,16 +9,16 @@ mod svd;
 use crate::shapes::BoundingBox;
 use crate::shapes::DualQuadric;
 use crate::shapes::Ellipsoid;
-use crate::shapes::NotAnEllipsoid;
+use crate::shapes::EllipsoidError;
 use manifactor_geometry::{Camera, Se3};
 use manifactor_graph::Manifold;
 use nalgebra::Vector3;
 use std::fmt::Debug;
 
-pub use depth::Depth;
-pub use first_of::FirstOf;
-pub use rays::Rays;
-pub use svd::Svd;
+pub use depth::DepthInitialiser;
+pub use first_of::FirstOfInitialiser;
+pub use rays::RaysInitialiser;
+pub use svd::SvdInitialiser;
 
 /// A method for the initial estimate of an object.
 #[typetag::serialize(tag = "type")]
@@ -27,14 +27,14 @@ pub trait Initialiser: Debug + Send + Sync {
     ///
     /// # Errors
     /// If the views do not determine the object, or if the result is not an object in front of all cameras.
-    fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError>;
+    fn initialise(&self, views: &[ObjectView]) -> Result<DualQuadric, InitialiseError>;
 }
 
 manifactor_graph::kind!(dyn Initialiser, "initialiser");
 
 /// A bounding box of the object, with the pose and the calibration of the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
+pub struct ObjectView {
     /// Pose of the camera.
     pub world_from_camera: Se3,
     /// Calibration of the camera.
@@ -90,7 +90,7 @@ pub enum InitialiseError {
     Undetermined,
     /// The best-fitting surface is not an ellipsoid.
     #[error(transparent)]
-    NotAnEllipsoid(#[from] NotAnEllipsoid),
+    NotAnEllipsoid(#[from] EllipsoidError),
     /// The estimated object is behind a camera.
     #[error("the object came out behind the camera of view {view}")]
     Behind {
@@ -114,7 +114,7 @@ pub enum InitialiseError {
     All(Vec<(&'static str, InitialiseError)>),
 }
 
-impl View {
+impl ObjectView {
     /// Creates a view with all sides observed and without depth.
     pub fn new(world_from_camera: Se3, camera: Camera, bounding_box: BoundingBox) -> Self {
         Self { world_from_camera, camera, bounding_box, observed: [true; 4], depth: None }
@@ -144,23 +144,23 @@ impl View {
 }
 
 /// Returns the largest angle between the lines of sight of two views, in degrees; 0 for fewer than two.
-pub fn parallax(views: &[View]) -> f64 {
-    let sights: Vec<_> = views.iter().map(View::sight).collect();
+pub fn parallax(views: &[ObjectView]) -> f64 {
+    let sights: Vec<_> = views.iter().map(ObjectView::sight).collect();
     let pairs = sights.iter().enumerate().flat_map(|(i, a)| sights[..i].iter().map(move |b| a.dot(b)));
     pairs.fold(1.0, f64::min).clamp(-1.0, 1.0).acos().to_degrees()
 }
 
-fn check_parallax(views: &[View], needed: f64) -> Result<(), InitialiseError> {
+fn check_parallax(views: &[ObjectView], needed: f64) -> Result<(), InitialiseError> {
     let degrees = if needed > 0.0 { parallax(views) } else { 0.0 };
     if degrees >= needed { Ok(()) } else { Err(InitialiseError::TooLittleParallax { degrees, needed }) }
 }
 
 /// Checks that there are enough views and that all numbers are finite.
-fn check_views(views: &[View], needed: usize) -> Result<(), InitialiseError> {
+fn check_views(views: &[ObjectView], needed: usize) -> Result<(), InitialiseError> {
     if views.len() < needed {
         return Err(InitialiseError::TooFewViews { found: views.len(), needed });
     }
-    let bad = |v: &View| !v.world_from_camera.is_finite() || v.depth.is_some_and(|d| !d.is_finite());
+    let bad = |v: &ObjectView| !v.world_from_camera.is_finite() || v.depth.is_some_and(|d| !d.is_finite());
     match views.iter().position(bad) {
         Some(view) => Err(InitialiseError::NotFinite { view }),
         None => Ok(()),
@@ -168,13 +168,13 @@ fn check_views(views: &[View], needed: usize) -> Result<(), InitialiseError> {
 }
 
 /// Checks that the whole object is in front of every camera.
-fn check_visible(quadric: &DualQuadric, views: &[View]) -> Result<(), InitialiseError> {
+fn check_visible(quadric: &DualQuadric, views: &[ObjectView]) -> Result<(), InitialiseError> {
     for (view, seen_by) in views.iter().enumerate() {
         let pose = &seen_by.world_from_camera;
         if quadric.is_in_front_of(pose) {
             continue;
         }
-        return Err(if Ellipsoid::seen(pose, quadric).centroid.z <= 0.0 {
+        return Err(if Ellipsoid::in_camera_frame(pose, quadric).centroid.z <= 0.0 {
             InitialiseError::Behind { view }
         } else if quadric.contains(&pose.translation) {
             InitialiseError::Around { view }

@@ -10,8 +10,9 @@ pub use factors::{BoundingBoxFactor, BoxModel, CentroidDepth, QuadricPrior, Shap
 pub use factors::{
     HorizontalOrientation, HorizontalOrientationSmooth, VerticalOrientation, VerticalOrientationSmooth,
 };
-pub use manifactor_geometry::{Camera, NotACamera};
+pub use manifactor_geometry::{Camera, CameraError};
 pub use shapes::{
-    AxisOrder, BoundingBox, Box3, DualConic, DualQuadric, Ellipse, Ellipsoid, LONGEST, LandmarkError,
-    NotABox, NotABox3, NotAnEllipsoid, NotSemiAxes, OnHyperboloid, SHORTEST, SIDES, SemiAxes,
+    AxisOrder, BoundingBox, BoundingBoxError, Box3, Box3Error, DualConic, DualQuadric, Ellipse, Ellipsoid,
+    EllipsoidError, LandmarkError, MAX_SEMI_AXIS, MIN_SEMI_AXIS, OnHyperboloid, SIDES, SemiAxes,
+    SemiAxesError,
 };

@@ -13,15 +13,15 @@ mod semi_axes;
 pub(crate) mod tangent_line;
 
 pub use axis_order::AxisOrder;
-pub use bounding_box::{BoundingBox, NotABox, SIDES};
-pub use box3::{Box3, NotABox3};
+pub use bounding_box::{BoundingBox, BoundingBoxError, SIDES};
+pub use box3::{Box3, Box3Error};
 pub use dual_conic::DualConic;
 pub use dual_quadric::DualQuadric;
 pub use ellipse::Ellipse;
 pub use ellipsoid::Ellipsoid;
-pub use from_matrix::{NotAnEllipsoid, OnHyperboloid};
+pub use from_matrix::{EllipsoidError, OnHyperboloid};
 pub use landmark::LandmarkError;
-pub use semi_axes::{LONGEST, NotSemiAxes, SHORTEST, SemiAxes};
+pub use semi_axes::{MAX_SEMI_AXIS, MIN_SEMI_AXIS, SemiAxes, SemiAxesError};
 
-pub(crate) use dual_quadric::turned;
+pub(crate) use dual_quadric::move_and_scale;
 pub(crate) use ellipse::Side;

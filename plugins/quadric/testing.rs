@@ -49,7 +49,7 @@ pub fn unequal_quadric() -> impl Strategy<Value = DualQuadric> + Clone {
 }
 
 /// Usual semi-axes of a class, and the order of the comparison.
-pub fn usual() -> impl Strategy<Value = (SemiAxes, AxisOrder)> {
+pub fn typical_quadric() -> impl Strategy<Value = (SemiAxes, AxisOrder)> {
     let lengths =
         prop::array::uniform3(0.01..2.0).prop_filter_map("semi-axes", |s| SemiAxes::new(s.into()).ok());
     (lengths, prop_oneof![Just(AxisOrder::Sorted), Just(AxisOrder::AsGiven)])
@@ -95,7 +95,7 @@ pub fn any_view() -> impl Strategy<Value = (Camera, Se3, DualQuadric)> + Clone {
     (any_camera(), any_se3(), any_so3(), at, shape, share).prop_map(
         |(camera, pose, rotation, at, shape, share)| {
             let unit = DualQuadric { pose: Se3::new(rotation, at), semi_axes: shape };
-            let depth = Ellipsoid::seen(&Se3::identity(), &unit).axes.row(2).norm();
+            let depth = Ellipsoid::in_camera_frame(&Se3::identity(), &unit).axes.row(2).norm();
             let pose_of_object = pose.compose(&unit.pose);
             (camera, pose, DualQuadric { pose: pose_of_object, semi_axes: shape * (share * at.z / depth) })
         },

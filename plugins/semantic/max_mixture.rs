@@ -215,7 +215,7 @@ struct Weighted {
 }
 
 impl Weighted {
-    fn of<'a>(&self, all: &[&'a dyn Variable]) -> Vec<&'a dyn Variable> {
+    fn select_variables<'a>(&self, all: &[&'a dyn Variable]) -> Vec<&'a dyn Variable> {
         self.over.iter().map(|place| all[*place]).collect()
     }
 }
@@ -277,7 +277,7 @@ impl Mixture {
             let residual = match &part.factor {
                 None => DVector::zeros(0),
                 Some(of) => {
-                    let (factor, x) = (of.factor.erased(), of.of(x));
+                    let (factor, x) = (of.factor.erased(), of.select_variables(x));
                     let defined = factor.is_defined(&x)?;
                     &of.whitening * DVector::from(factor.residual(&x).filter(|_| defined)?)
                 }
@@ -328,7 +328,7 @@ impl DynamicResidual for Mixture {
         let Some((part, rows)) = self.best(&x) else { return residual.fill(0.0) };
         self.write((part, &rows), residual);
         let Some(of) = &part.factor else { return };
-        let Some(linearization) = of.factor.erased().linearize(&of.of(&x)) else { return };
+        let Some(linearization) = of.factor.erased().linearize(&of.select_variables(&x)) else { return };
         let over = of.over.iter().copied().zip(&linearization.jacobians);
         for (variable, jacobian) in over.filter(|(v, _)| free[*v]) {
             let whitened = &of.whitening * jacobian;
@@ -350,7 +350,7 @@ fn places(
 ) -> Result<Vec<usize>, MixtureError> {
     let n = signature.variables.len();
     let over: Vec<usize> = over.map_or_else(|| (0..n).collect(), <[usize]>::to_vec);
-    let is_once = |(i, place): (usize, &usize)| *place < PLACES && !over[..i].contains(place);
+    let is_once = |(i, place): (usize, &usize)| *place < MAX_VARIABLES && !over[..i].contains(place);
     if signature.many || over.len() != n || !over.iter().enumerate().all(is_once) {
         let names = signature.variables.iter().map(|id| manifactor_graph::manifold_name(*id));
         let found = names.collect::<Vec<_>>().join(", ") + if signature.many { ", …" } else { "" };
@@ -360,7 +360,7 @@ fn places(
 }
 
 /// Maximum number of variables of a mixture.
-const PLACES: usize = 64;
+const MAX_VARIABLES: usize = 64;
 
 #[cfg(test)]
 mod tests;

@@ -3,8 +3,10 @@
 use manifactor::geometry::Se3;
 use manifactor::graph::checked::Share;
 use manifactor::quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
-use manifactor::slam::association::{Association, Associator, Image, Learned, Map, best_assignment};
-use manifactor::slam::class::Aliases;
+use manifactor::slam::association::{
+    Association, Associator, Corrections, FrameDetections, MapEstimate, best_assignment,
+};
+use manifactor::slam::class::ClassAliases;
 use manifactor::slam::prior_map::PriorObject;
 use manifactor::slam::sequence::{Detection, ObjectId};
 use manifactor::{register, typetag};
@@ -68,7 +70,12 @@ impl Default for Projection {
 
 #[typetag::serialize(name = "iou")]
 impl Association for Iou {
-    fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator> {
+    fn create_associator(
+        &self,
+        camera: Camera,
+        aliases: &ClassAliases,
+        known: &[Arc<PriorObject>],
+    ) -> Box<dyn Associator> {
         let Self { least, frames } = *self;
         let rule = Projection { least, least_before: least, frames, visible: Share::literal(0.0) };
         Box::new(Overlap::new(rule, false, camera, aliases, known))
@@ -78,7 +85,12 @@ register!(dyn Association, "iou", Iou);
 
 #[typetag::serialize(name = "projection")]
 impl Association for Projection {
-    fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator> {
+    fn create_associator(
+        &self,
+        camera: Camera,
+        aliases: &ClassAliases,
+        known: &[Arc<PriorObject>],
+    ) -> Box<dyn Associator> {
         Box::new(Overlap::new(self.clone(), true, camera, aliases, known))
     }
 }
@@ -90,7 +102,7 @@ struct Overlap {
     rule: Projection,
     by_class: bool,
     camera: Camera,
-    aliases: Aliases,
+    aliases: ClassAliases,
     objects: BTreeMap<ObjectId, Last>,
     next: u32,
 }
@@ -108,7 +120,7 @@ impl Overlap {
         rule: Projection,
         by_class: bool,
         camera: Camera,
-        aliases: &Aliases,
+        aliases: &ClassAliases,
         known: &[Arc<PriorObject>],
     ) -> Self {
         let last = |object: &Arc<PriorObject>| {
@@ -138,7 +150,7 @@ impl Overlap {
 }
 
 impl Associator for Overlap {
-    fn associate(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>> {
+    fn associate(&self, image: &FrameDetections<'_>, map: &dyn MapEstimate) -> Vec<Option<ObjectId>> {
         let (pose, rule) = (map.pose(image.frame), &self.rule);
         let classes: Vec<_> = image.detections.iter().map(|d| self.class(d)).collect();
         let mut overlaps = vec![];
@@ -163,7 +175,12 @@ impl Associator for Overlap {
         matched.into_iter().map(|column| column.map(|column| known[column]).or_else(|| new.next())).collect()
     }
 
-    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {
+    fn learn_from_frame(
+        &mut self,
+        image: &FrameDetections<'_>,
+        names: &[Option<ObjectId>],
+        map: &dyn MapEstimate,
+    ) -> Corrections {
         for (detection, id) in image.detections.iter().zip(names) {
             if let Some(id) = *id {
                 let seen = Some((image.frame, detection.bounding_box));
@@ -176,6 +193,6 @@ impl Associator for Overlap {
         let since = image.frame.saturating_sub(self.rule.frames);
         let is_recent = |last: &Last| last.seen.is_some_and(|(frame, _)| frame >= since);
         self.objects.retain(|id, last| is_recent(last) || map.object(*id).is_some());
-        Learned::default()
+        Corrections::default()
     }
 }

@@ -27,13 +27,13 @@ pub use stream::{frame_journal, json_lines};
 pub use view::view;
 
 use manifactor::config::{Document, Errors, Format, read_graph, read_graph_section, to_json, write_graph};
-use manifactor::formats::pose_graph::{self, Options, Repair};
+use manifactor::formats::pose_graph::{self, InformationRepair, PoseGraphOptions};
 use manifactor::formats::{accelerometer, bal, detections, timestamps, tum};
 use manifactor::prelude::*;
 use manifactor::slam::run::estimate;
 use manifactor::slam::run_document::RunDocument;
 use manifactor::slam::sequence::Sequence;
-use manifactor::slam::simulator::Simulated;
+use manifactor::slam::simulator::SimulatedSource;
 use manifactor::solve::{Auto, IterationRecord};
 use manifactor_graph::checked::Count;
 use std::num::NonZero;
@@ -74,8 +74,8 @@ const SOLVED: usize = 64;
 /// Reads g2o and TORO files with each policy of repair.
 pub fn pose_graph(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
-    for repair in [Repair::Error, Repair::Reject, Repair::Clamp] {
-        let options = Options { repair, ..Options::default() };
+    for repair in [InformationRepair::Error, InformationRepair::Reject, InformationRepair::Clamp] {
+        let options = PoseGraphOptions { repair, ..PoseGraphOptions::default() };
         if let Ok(read) = pose_graph::parse(&text, "graph.g2o", &options) {
             three_steps(&read.graph, &read.values, &Auto::default());
         }
@@ -138,7 +138,7 @@ pub fn expression(data: &[u8]) {
 /// Reads runs, with a small simulation instead of their source: from the document to the report.
 pub fn run(data: &[u8]) {
     static SEQUENCE: LazyLock<Arc<Sequence>> = LazyLock::new(|| {
-        let mut simulation = Simulated::default();
+        let mut simulation = SimulatedSource::default();
         simulation.trajectory.frames = Count::literal(6);
         simulation.scene.objects = Count::literal(2);
         Arc::new(simulation.simulate().unwrap_or_else(|e| panic!("{e}")))

@@ -51,7 +51,7 @@ fn a_run_names_it_among_its_semantics() {
     document.set(&["source.trajectory.frames=20", "source.scene.objects=5"]).unwrap();
     let document = RunDocument::read(&document).unwrap_or_else(|e| panic!("{e}"));
     let mut run = Run::new(&document, None);
-    let (estimate, _) = run.variant(&document.variants[1], &mut Silent).unwrap();
+    let (estimate, _) = run.run_variant(&document.variants[1], &mut Silent).unwrap();
     let factors = estimate.mapping.graph.factors().iter();
     assert!(factors.filter(|f| f.factor.typetag_name() == "rests_on").count() > 0);
 }

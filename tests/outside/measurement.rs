@@ -4,7 +4,7 @@ use manifactor::geometry::Se3;
 use manifactor::graph::checked::Positive;
 use manifactor::prelude::*;
 use manifactor::quadric::DualQuadric;
-use manifactor::slam::measurement::{Errors, Measurement, Rows, UsualDepth};
+use manifactor::slam::measurement::{Measurement, MeasurementSigmas, ResidualRows, UsualDepth};
 use manifactor::slam::register_measurement;
 use manifactor::slam::run::Run;
 use manifactor::slam::run_document::RunDocument;
@@ -47,8 +47,8 @@ impl Measurement for Distance {
     fn factor(&self) -> Arc<dyn Factor> {
         Arc::new(*self)
     }
-    fn deviations(&self, _: &Errors, _: &Rows) -> Rows {
-        Rows::repeat(0.01)
+    fn deviations(&self, _: &MeasurementSigmas, _: &ResidualRows) -> ResidualRows {
+        ResidualRows::repeat(0.01)
     }
     fn cost_of_new(&self, usual: &UsualDepth) -> f64 {
         usual.cost(self.distance.get())
@@ -90,7 +90,7 @@ fn run(field: &str, association: &str) -> (usize, usize, String) {
     let name = folder.path().join("run.toml").display().to_string();
     let document = RunDocument::read(&Document::parse(name, text, Format::Toml).unwrap()).unwrap();
     let mut run = Run::new(&document, None);
-    let (estimate, report) = run.variant(&document.variants[0], &mut Silent).unwrap();
+    let (estimate, report) = run.run_variant(&document.variants[0], &mut Silent).unwrap();
     let factors = estimate.mapping.graph.factors().iter();
     let distances = factors.filter(|entry| entry.factor.typetag_name() == "test_distance").count();
     (distances, report.counts.objects, format!("{:?}", report.warnings))

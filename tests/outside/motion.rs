@@ -3,7 +3,7 @@ use manifactor::config::{Document, Format};
 use manifactor::geometry::{Between, Se3};
 use manifactor::graph::FactorEntry;
 use manifactor::prelude::*;
-use manifactor::slam::motion::{MotionError, MotionModel, Step, pose_key};
+use manifactor::slam::motion::{MotionError, MotionModel, MotionStep, pose_key};
 use manifactor::slam::run::Run;
 use manifactor::slam::run_document::RunDocument;
 use schemars::JsonSchema;
@@ -20,11 +20,11 @@ struct RandomWalk {
 
 #[typetag::serialize(name = "test_random_walk")]
 impl MotionModel for RandomWalk {
-    fn predict(&self, _: &Step<'_>, from: &Se3) -> Se3 {
+    fn predict(&self, _: &MotionStep<'_>, from: &Se3) -> Se3 {
         *from
     }
 
-    fn factors(&self, step: &Step<'_>) -> Result<Vec<FactorEntry>, MotionError> {
+    fn factors(&self, step: &MotionStep<'_>) -> Result<Vec<FactorEntry>, MotionError> {
         let noise = Noise::sigma(self.sigma * step.seconds.sqrt()).map_err(|why| step.error(&why))?;
         let keys = step.frames.map(pose_key).to_vec();
         let factor = Arc::new(Between { relative: Se3::identity() });
@@ -42,7 +42,7 @@ fn run(sigma: f64) -> Result<f64, String> {
     );
     let document = Document::parse("run.toml", text, Format::Toml).unwrap();
     let document = RunDocument::read(&document).unwrap_or_else(|e| panic!("{e}"));
-    let done = Run::new(&document, None).variant(&document.variants[0], &mut Silent);
+    let done = Run::new(&document, None).run_variant(&document.variants[0], &mut Silent);
     let (estimate, report) = done.map_err(|error| error.to_string())?;
     assert!(report.counts.objects > 3, "{:?}", report.warnings);
     let path = estimate.trajectory();

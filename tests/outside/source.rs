@@ -6,7 +6,7 @@ use manifactor::quadric::Camera;
 use manifactor::slam::run::Run;
 use manifactor::slam::run_document::RunDocument;
 use manifactor::slam::sequence::{Frame, Sequence};
-use manifactor::slam::source::{Folders, Source, SourceError};
+use manifactor::slam::source::{InputFolders, SequenceSource, SourceError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -19,8 +19,8 @@ struct Nothing {
 }
 
 #[typetag::serialize(name = "test_nothing")]
-impl Source for Nothing {
-    fn load(&self, _folders: &Folders) -> Result<Sequence, SourceError> {
+impl SequenceSource for Nothing {
+    fn load(&self, _folders: &InputFolders) -> Result<Sequence, SourceError> {
         let frame = |i: usize| Frame { timestamp: i as f64, world_from_camera: Se3::identity() };
         Ok(Sequence {
             camera: Camera { fx: 320.0, fy: 320.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 },
@@ -33,7 +33,7 @@ impl Source for Nothing {
         })
     }
 }
-register!(dyn Source, "test_nothing", Nothing);
+register!(dyn SequenceSource, "test_nothing", Nothing);
 
 #[test]
 fn a_run_names_it() {
@@ -41,7 +41,7 @@ fn a_run_names_it() {
     let document = Document::parse("run.toml", text, Format::Toml).unwrap();
     let document = RunDocument::read(&document).unwrap_or_else(|e| panic!("{e}"));
     let mut run = Run::new(&document, None);
-    let (estimate, report) = run.variant(&document.variants[0], &mut Silent).unwrap();
+    let (estimate, report) = run.run_variant(&document.variants[0], &mut Silent).unwrap();
     assert_eq!((report.counts.frames, report.counts.objects), (4, 0));
     assert_eq!(estimate.trajectory().len(), 4);
 }

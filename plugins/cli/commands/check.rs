@@ -13,7 +13,7 @@ use manifactor::config::{Document, Value};
 use manifactor::graph::{Graph, Key, Values};
 use manifactor::quadric::DualQuadric;
 use manifactor::slam::experiment::Experiment;
-use manifactor::slam::run::{Mapped, Run as Running};
+use manifactor::slam::run::{MappedSequence, Run as Running};
 use manifactor::solve::{Problem, Silent};
 use serde_json::json;
 
@@ -89,8 +89,8 @@ impl Check {
         found.lines.push(format!("A run of {}.", count(document.variants.len(), "variant")));
         let mut run = Running::new(&document, self.run.data());
         for variant in document.variants.iter().filter(|_| self.load) {
-            let mapped = Mapped::new(run.sequence(variant)?, &variant.settings, &mut Silent)?;
-            let Mapped { sequence, mapping, .. } = mapped;
+            let mapped = MappedSequence::new(run.sequence(variant)?, &variant.settings, &mut Silent)?;
+            let MappedSequence { sequence, mapping, .. } = mapped;
             let mut of_this = Found::default();
             of_this.warnings.extend(mapping.warnings.iter().map(ToString::to_string));
             of_this.look(&mapping.graph, &mapping.values)?;

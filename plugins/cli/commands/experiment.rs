@@ -9,9 +9,11 @@ use crate::status::Status;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use manifactor::slam::experiment::{self, Experiment as Sweep, Progress, Shard, Summary, TrialLog};
+use manifactor::slam::experiment::{
+    self, Experiment as Sweep, ExperimentProgress, ExperimentSummary, Shard, TrialLog,
+};
 use manifactor::slam::output::{OutputFolder, write_whole};
-use manifactor::slam::source::Folders;
+use manifactor::slam::source::InputFolders;
 use manifactor::solve::{Interrupt, Observer};
 use manifactor::viz::{experiment_page, experiment_pictures};
 use std::io::IsTerminal;
@@ -63,9 +65,9 @@ impl Experiment {
             sweep.output.clone_from(out);
         }
         if let Some(shard) = self.shard {
-            sweep.keep(shard);
+            sweep.restrict_to_shard(shard);
         }
-        let folders = Folders { data: self.data.clone(), document: sweep.folder.clone() };
+        let folders = InputFolders { data: self.data.clone(), document: sweep.folder.clone() };
         let claimed = OutputFolder::claim(&sweep.output, "experiment", &self.config, self.force)?;
         let mut journal = TrialLog::open(claimed)?;
         journal.take_over_shards()?;
@@ -105,7 +107,7 @@ impl Experiment {
         Ok(status)
     }
 
-    fn tell(&self, sweep: &Sweep, summary: &Summary) {
+    fn tell(&self, sweep: &Sweep, summary: &ExperimentSummary) {
         if self.json {
             output::json(summary);
         } else {
@@ -123,7 +125,7 @@ impl Experiment {
 ///
 /// # Errors
 /// If a file cannot be written. The files before it are complete.
-pub fn write_experiment(sweep: &Sweep, journal: &TrialLog, text: &str) -> Result<Summary, Failure> {
+pub fn write_experiment(sweep: &Sweep, journal: &TrialLog, text: &str) -> Result<ExperimentSummary, Failure> {
     write_until(sweep, journal, text, |_| ControlFlow::Continue(())).map(|(summary, _)| summary)
 }
 
@@ -134,7 +136,7 @@ fn write_until(
     journal: &TrialLog,
     text: &str,
     goes_on: impl FnMut(&str) -> ControlFlow<()>,
-) -> Result<(Summary, bool), Failure> {
+) -> Result<(ExperimentSummary, bool), Failure> {
     let summary = experiment::write(sweep, journal)?;
     let trials = experiment::trials_table(sweep, journal);
     let page = experiment_page(sweep, &summary, &trials, text);
@@ -166,7 +168,7 @@ impl Bar {
         Self::Terminal(bar)
     }
 
-    fn show(&self, Progress { done, kept, trials }: Progress) {
+    fn show(&self, ExperimentProgress { done, kept, trials }: ExperimentProgress) {
         match self {
             Self::Terminal(bar) => {
                 if done == kept {

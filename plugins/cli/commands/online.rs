@@ -9,7 +9,7 @@ use crate::status::Status;
 use crate::view::{Solve, View, address};
 use clap::Args;
 use manifactor::slam::online::{FrameError, FrameReport, Mapper};
-use manifactor::slam::run::{RunError, Watch};
+use manifactor::slam::run::{RunError, StreamWatcher};
 use manifactor::slam::sequence::Observation;
 use manifactor::solve::{AllObservers, Interrupt};
 use serde_json::json;
@@ -63,7 +63,7 @@ impl Online {
             }
             if let Some(journal) = &self.journal {
                 check_journal(journal, &run.document.output)?;
-                run.keep_frames(journal.clone());
+                run.journal_frames(journal.clone());
             }
             let mut progress = Progress::new(verbose, &variant.name);
             let interrupted = interrupt.clone();
@@ -71,7 +71,7 @@ impl Online {
             let mut observers = AllObservers(vec![&mut progress, &mut interrupt, &mut solve]);
             let mut frames =
                 Frames { command: self, interrupt: interrupted, view: view.as_ref(), frames: 0, begun: None };
-            let done = run.variant_online(variant, &mut frames, &mut observers)?;
+            let done = run.run_variant_online(variant, &mut frames, &mut observers)?;
             if let Some(view) = &view {
                 view.settle(&done.0);
             }
@@ -131,7 +131,7 @@ impl Frames<'_> {
 
     fn tell(&self, report: &FrameReport, mapper: &Mapper, took: f64) {
         let (objects, undetermined) =
-            (mapper.mapped(), report.updates.last().map_or(0, |u| u.undetermined_directions.len()));
+            (mapper.mapped_objects(), report.updates.last().map_or(0, |u| u.undetermined_directions.len()));
         if self.command.options.json {
             output::json_line(&json!({ "seconds": took, "objects": objects, "report": report }));
         } else {
@@ -150,12 +150,12 @@ impl Frames<'_> {
     }
 }
 
-impl Watch for Frames<'_> {
-    fn quiet(&mut self) -> ControlFlow<()> {
+impl StreamWatcher for Frames<'_> {
+    fn on_idle(&mut self) -> ControlFlow<()> {
         self.goes_on()
     }
 
-    fn wait(&mut self, timestamp: f64) -> ControlFlow<()> {
+    fn before_frame(&mut self, timestamp: f64) -> ControlFlow<()> {
         let Some(rate) = self.command.rate else { return ControlFlow::Continue(()) };
         let (begun, first) = *self.begun.get_or_insert((Instant::now(), timestamp));
         // a timestamp that is not after the first one needs no waiting
@@ -166,7 +166,7 @@ impl Watch for Frames<'_> {
         self.goes_on()
     }
 
-    fn frame(
+    fn on_frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
         observation: Option<&Observation>,
@@ -196,7 +196,7 @@ impl Watch for Frames<'_> {
         self.goes_on()
     }
 
-    fn end(&mut self, mapper: &mut Mapper) {
+    fn on_end(&mut self, mapper: &mut Mapper) {
         if let Some(view) = self.view {
             view.refresh(mapper);
         }

@@ -9,7 +9,7 @@ use crate::output;
 use crate::output::text::{Table, count, keys, seconds};
 use crate::status::Status;
 use clap::Args;
-use manifactor::formats::replay::{Latencies, Replay as Steps, Step};
+use manifactor::formats::replay::{GraphReplay as Steps, Latencies, ReplayStep};
 use manifactor::graph::{Graph, Key};
 use manifactor::slam::output::OutputFolder;
 use manifactor::smoother::{Finished, Rejection, Smoother, Span, UpdateReport};
@@ -251,7 +251,7 @@ impl Replay {
 }
 
 /// Removes the factors of variables that are no longer in the smoother, and returns their number.
-fn leave_out(step: &mut Step, session: &Smoother) -> usize {
+fn leave_out(step: &mut ReplayStep, session: &Smoother) -> usize {
     let is_there = |key: &Key| step.values.contains(key.as_str()) || session.estimate(key.as_str()).is_some();
     let mut factors = Graph::new();
     for entry in step.factors.factors().iter().filter(|entry| entry.keys.iter().all(is_there)) {

@@ -12,7 +12,7 @@ use manifactor::slam::output::{OutputFolder, refuse_own_maps, write_report, writ
 use manifactor::slam::record::{RunRecord, VariantRecord};
 use manifactor::slam::report::{RunReport, VariantReport};
 use manifactor::slam::run::{Run as Running, RunError};
-use manifactor::slam::run_document::Variant;
+use manifactor::slam::run_document::RunVariant;
 use manifactor::solve::{AllObservers, Interrupt, Observer};
 use manifactor::viz::{latencies, ply, run_page};
 use std::ops::ControlFlow;
@@ -51,7 +51,7 @@ impl Run {
         let mut interrupt = interrupt::on_ctrl_c();
         let report = self.options.run_as("run", verbose, interrupt.clone(), |run, variant| {
             let mut watch = Watch::new(verbose, &variant.name);
-            run.variant(variant, &mut AllObservers(vec![&mut watch, &mut interrupt]))
+            run.run_variant(variant, &mut AllObservers(vec![&mut watch, &mut interrupt]))
         })?;
         if self.options.json {
             output::json(&report);
@@ -69,7 +69,7 @@ impl RunOptions {
         command: &str,
         verbose: u8,
         mut interrupt: Interrupt,
-        mut estimate: impl FnMut(&mut Running<'_>, &Variant) -> Result<(Estimate, VariantReport), RunError>,
+        mut estimate: impl FnMut(&mut Running<'_>, &RunVariant) -> Result<(Estimate, VariantReport), RunError>,
     ) -> Result<RunReport, Failure> {
         let mut document = self.run.open()?;
         if let Some(out) = &self.out {

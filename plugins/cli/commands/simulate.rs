@@ -9,7 +9,7 @@ use manifactor::config::{Diagnostic, Fault, SourceText};
 use manifactor::slam::output::OutputFolder;
 use manifactor::slam::recording;
 use manifactor::slam::run::Run as Running;
-use manifactor::slam::source::line;
+use manifactor::slam::source::format_line;
 use std::path::PathBuf;
 
 /// Write the sequence of a run's source as files for the source `recorded`, or as lines of JSON.
@@ -40,7 +40,7 @@ impl Simulate {
         };
         let sequence = || Running::new(&document, self.run.data()).sequence(variant);
         let Some(out) = &self.out else {
-            sequence()?.observations().for_each(|frame| output::print(&(line(&frame) + "\n")));
+            sequence()?.observations().for_each(|frame| output::print(&(format_line(&frame) + "\n")));
             return Ok(Status::Done);
         };
         // the claim lasts to the end

@@ -3,7 +3,7 @@ use crate::failure::Failure;
 use crate::output;
 use clap::Args;
 use manifactor::config::{Format, write_graph};
-use manifactor::formats::whole::{can_write, write_whole};
+use manifactor::formats::whole::{check_writable, write_whole};
 use manifactor::formats::{GraphFormat, GraphWriter};
 use manifactor::graph::{Graph, Values};
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ impl Destination {
         if !self.force {
             refuse_to_replace(path, input)?;
         }
-        can_write(path).map_err(Failure::at(path))
+        check_writable(path).map_err(Failure::at(path))
     }
 
     /// Returns whether a graph is to be written.
@@ -71,7 +71,7 @@ fn refuse_to_replace(path: &Path, input: &Path) -> Result<(), Failure> {
 
 /// The writer for the extension of `path`, if its format is not a document.
 fn writer(path: &Path) -> Option<GraphWriter> {
-    GraphFormat::of_path(path)?.format
+    GraphFormat::by_extension(path)?.format
 }
 
 fn no_format(path: &Path) -> Failure {

@@ -20,7 +20,7 @@ impl Content {
         }
         // a pipe can be read only once
         let text = read_text(path)?;
-        match GraphFormat::of(path, &text) {
+        match GraphFormat::detect(path, &text) {
             Some(format) => Ok(Self::Graph(text, format)),
             None if path == Path::new(STDIN) => Ok(Self::Document(parse(text)?)),
             None => Err(unknown_format(path)),

@@ -5,7 +5,7 @@ use crate::input::solver::SolverArguments;
 use crate::output::text::count;
 use clap::{Args, ValueEnum};
 use manifactor::config::{Definitions, Document, Errors, Format, graph_root, read_graph_section};
-use manifactor::formats::{self, GraphFormat, GraphRead, Repair};
+use manifactor::formats::{self, GraphFormat, GraphRead, InformationRepair};
 use manifactor::graph::{Graph, Values};
 use manifactor::smoother::SmootherSettings as Online;
 use manifactor::solve::{Bytes, Optimizer, Start, available_memory, memory_limit};
@@ -82,13 +82,13 @@ impl Reading {
         Ok(GraphFile { graph, values, optimizer, start, online, notes })
     }
 
-    fn choices(&self) -> formats::Reading {
+    fn choices(&self) -> formats::ReadOptions {
         let repair = match self.repair {
-            RepairChoice::Error => Repair::Error,
-            RepairChoice::Reject => Repair::Reject,
-            RepairChoice::Clamp => Repair::Clamp,
+            RepairChoice::Error => InformationRepair::Error,
+            RepairChoice::Reject => InformationRepair::Reject,
+            RepairChoice::Clamp => InformationRepair::Clamp,
         };
-        formats::Reading { repair, anchor: !self.no_anchor, lenient: self.lenient }
+        formats::ReadOptions { repair, anchor: !self.no_anchor, lenient: self.lenient }
     }
 }
 

@@ -1,9 +1,9 @@
 //! The table that an experiment prints.
 use crate::output::text::{Table, on_one_line, wrap};
-use manifactor::slam::experiment::Summary;
+use manifactor::slam::experiment::ExperimentSummary;
 
 /// Means of each group, and below each compared group its difference from the baseline.
-pub(crate) fn of(summary: &Summary) -> String {
+pub(crate) fn of(summary: &ExperimentSummary) -> String {
     let header: Vec<&str> = summary
         .columns
         .iter()

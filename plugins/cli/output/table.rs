@@ -1,9 +1,9 @@
 //! The table that a run prints.
 use crate::output::text::{self, Table, on_one_line, seconds};
 use manifactor::slam::mapping::object_key;
-use manifactor::slam::report::{Mean, Prediction, RunReport, TrajectoryReport, VariantReport};
+use manifactor::slam::report::{ClusteredMean, Prediction, RunReport, TrajectoryReport, VariantReport};
 use manifactor::slam::sequence::ObjectId;
-use manifactor::slam::variance::{BoxComponent, MotionComponent, Score};
+use manifactor::slam::variance::{BoxComponent, CrossValidationScore, MotionComponent};
 
 /// The result of a run, as a table and a few lines.
 pub(crate) fn of_run(report: &RunReport) -> String {
@@ -87,8 +87,8 @@ fn stream(variant: &VariantReport) -> String {
     let mut text = format!(
         "{name}: {} as they came, p50 {p50}, p99 {p99}, at most {max}; {} born, {} withdrawn, cost {:.3} after the last",
         text::count(online.seconds.len(), "frame"),
-        text::count(online.born, "object"),
-        online.withdrawn,
+        text::count(online.initialized, "object"),
+        online.removed,
         online.cost
     );
     if let Some(trajectory) = online.trajectory.first() {
@@ -130,10 +130,10 @@ fn noise(variant: &VariantReport) -> String {
     let Some(found) = variant.variance_components.last() else { return String::new() };
     let mut parts = vec![];
     if let Some(choice) = &found.odometry {
-        let Score { cost, deviation } = choice.score;
+        let CrossValidationScore { cost, deviation } = choice.score;
         let MotionComponent { rotation, translation, pivot } = choice.noise;
         let about = if pivot > 0.0 { format!(" about {pivot:.2} m ahead") } else { String::new() };
-        parts.push(if choice.is_kept() {
+        parts.push(if choice.keeps_input() {
             format!("odometry kept: the best correction changes what boxes of other objects cost by {cost:+.1} ± {deviation:.1}")
         } else {
             format!("odometry σ {rotation:.1e} rad, {translation:.1e} m{about}: boxes of other objects cost {cost:+.1} ± {deviation:.1}")
@@ -152,7 +152,7 @@ fn noise(variant: &VariantReport) -> String {
 fn held_out(variant: &VariantReport) -> String {
     let Some(held_out) = &variant.held_out else { return String::new() };
     let Prediction { boxes, objects, out_of_view, iou, pixels } = held_out.all;
-    let of = |mean: Mean, digits: usize| {
+    let of = |mean: ClusteredMean, digits: usize| {
         let error = mean.error.map(|error| format!(" ± {error:.digits$}")).unwrap_or_default();
         format!("{:.digits$}{error}", mean.mean)
     };

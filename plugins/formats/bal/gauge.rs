@@ -1,12 +1,12 @@
 //! Variables to hold so that the position, orientation and scale of a reconstruction from images are fixed.
-use crate::pose_graph::anchor::Parts;
+use crate::pose_graph::anchor::ConnectedSets;
 use manifactor_geometry::{BalCamera, Se3};
 use manifactor_graph::{Fixed, Graph, Key, Manifold, Values};
 
 /// Holds, in each connected part, the pose of the first camera and one direction of the camera farthest from
 /// it: the local axis along which that camera would move most if the scale changed.
-pub(super) fn hold(graph: &mut Graph, values: &Values) -> Vec<Key> {
-    let mut parts = Parts::connected(graph, values);
+pub(super) fn fix_gauge(graph: &mut Graph, values: &Values) -> Vec<Key> {
+    let mut parts = ConnectedSets::connected(graph, values);
     let is_free = |key: &Key| graph.fixed().get(key) != Some(&Fixed::Whole(true));
     let mut cameras: Vec<(usize, &Key, &BalCamera)> = vec![];
     for (key, camera) in values.all::<BalCamera>().filter(|(key, _)| is_free(key)) {

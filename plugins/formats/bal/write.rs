@@ -1,7 +1,7 @@
 //! Writes bundle adjustment problems as BAL files.
 use crate::error::FormatError;
 use crate::text::write_text;
-use crate::words::omitted;
+use crate::words::omission_notes;
 use manifactor_geometry::{BalCamera, Point3, ProjectionBal};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use std::collections::{BTreeMap, HashMap};
@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Parts of a graph that BAL cannot express and that were omitted.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Omitted {
+pub struct BalOmissions {
     /// Factors that are not observations of a point by a camera, by type name.
     pub factors: BTreeMap<&'static str, usize>,
     /// Variables that are neither cameras nor points, by type name.
@@ -23,10 +23,10 @@ pub struct Omitted {
     pub held: usize,
 }
 
-impl Omitted {
+impl BalOmissions {
     /// Returns the omitted parts as text.
     pub fn notes(&self) -> Vec<String> {
-        let mut notes = omitted("BAL", &self.variables, &self.factors);
+        let mut notes = omission_notes("BAL", &self.variables, &self.factors);
         let others = [("robust losses", self.losses), ("noise", self.noise), ("what is held", self.held)];
         for (what, n) in others.into_iter().filter(|(_, n)| *n > 0) {
             notes.push(format!("BAL cannot express {what}: {n} left out"));
@@ -39,12 +39,12 @@ impl Omitted {
 /// in their order.
 ///
 /// Numbers are written with all digits. Poses read back up to rounding, as the file contains their inverse.
-pub fn format(graph: &Graph, values: &Values) -> (String, Omitted) {
+pub fn format(graph: &Graph, values: &Values) -> (String, BalOmissions) {
     let cameras: Vec<_> = values.all::<BalCamera>().collect();
     let points: Vec<_> = values.all::<Point3>().collect();
     let camera_numbers: HashMap<&Key, usize> = cameras.iter().map(|(key, _)| *key).zip(0..).collect();
     let point_numbers: HashMap<&Key, usize> = points.iter().map(|(key, _)| *key).zip(0..).collect();
-    let mut omitted = Omitted { held: graph.fixed().len(), ..Omitted::default() };
+    let mut omitted = BalOmissions { held: graph.fixed().len(), ..BalOmissions::default() };
     let mut observations = vec![];
     for entry in graph.factors() {
         match observation(entry, &camera_numbers, &point_numbers) {
@@ -77,7 +77,7 @@ pub fn format(graph: &Graph, values: &Values) -> (String, Omitted) {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write(path: impl AsRef<Path>, graph: &Graph, values: &Values) -> Result<Omitted, FormatError> {
+pub fn write(path: impl AsRef<Path>, graph: &Graph, values: &Values) -> Result<BalOmissions, FormatError> {
     let (text, omitted) = format(graph, values);
     write_text(path.as_ref(), &text).map(|()| omitted)
 }

@@ -4,7 +4,7 @@ use manifactor_graph::{Fixed, Graph, Key, Values};
 /// Returns the first pose of each connected part without a held variable or a measurement in the world frame.
 /// For a part without a pose, its first variable.
 pub(crate) fn anchors(graph: &Graph, values: &Values, is_pose: impl Fn(&Key) -> bool) -> Vec<Key> {
-    let mut parts = Parts::connected(graph, values);
+    let mut parts = ConnectedSets::connected(graph, values);
     let place = |key: &Key| values.position(key.as_str());
     let mut held = vec![false; values.len()];
     let whole = graph.fixed().iter().filter(|(_, fixed)| **fixed == Fixed::Whole(true));
@@ -27,9 +27,9 @@ pub(crate) fn anchors(graph: &Graph, values: &Values, is_pose: impl Fn(&Key) -> 
 }
 
 /// Disjoint sets, stored as the parent of each member.
-pub(crate) struct Parts(Vec<usize>);
+pub(crate) struct ConnectedSets(Vec<usize>);
 
-impl Parts {
+impl ConnectedSets {
     /// Returns the connected sets of variables, by their index.
     pub(crate) fn connected(graph: &Graph, values: &Values) -> Self {
         let mut parts = Self((0..values.len()).collect());

@@ -1,9 +1,9 @@
 //! Builds a graph and its values from the records of a file.
 use super::anchor::anchors;
-use super::information::{Outcome, noise};
+use super::information::{EdgeNoise, noise};
 use super::record::{Absolute, AbsoluteMeasurement, Edge, Measurement, Record, Vertex, VertexType};
-use super::{Options, PoseGraph, Report};
-use crate::error::{Mistake, Problems};
+use super::{PoseGraph, PoseGraphOptions, PoseGraphReport};
+use crate::error::{Mistake, ProblemList};
 use crate::text::plausible;
 use manifactor_geometry::{
     BearingRange2, Between, Coordinates, Landmark, LieGroup, Point3, Position, Prior, Se2, Se3, So2,
@@ -20,10 +20,10 @@ use std::sync::Arc;
 /// Builds the graph, and records all problems. `None` if there is a problem.
 pub(crate) fn build(
     records: &[(usize, Record)],
-    options: &Options,
-    problems: &mut Problems<'_>,
+    options: &PoseGraphOptions,
+    problems: &mut ProblemList<'_>,
 ) -> Option<PoseGraph> {
-    let mut builder = Builder::new(options);
+    let mut builder = GraphBuilder::new(options);
     // Vertices first: a file may use them before their definition.
     for (line, record) in records {
         let defined = match record {
@@ -55,14 +55,14 @@ pub(crate) fn build(
     problems.ok(0, builder.finish().map_err(Mistake::from))
 }
 
-struct Builder<'a> {
-    options: &'a Options,
+struct GraphBuilder<'a> {
+    options: &'a PoseGraphOptions,
     graph: Graph,
     /// All edges, including omitted ones: their measurements still place vertices.
     measured: Graph,
     /// Vertices with a line.
     values: Values,
-    report: Report,
+    report: PoseGraphReport,
     /// Type of each vertex, and the line that determined it.
     types: HashMap<u64, (usize, VertexType)>,
     /// Vertices without a line.
@@ -79,14 +79,14 @@ fn key(id: u64, vertex_type: VertexType) -> Key {
     Key::indexed(if vertex_type.is_pose() { "x" } else { "l" }, id)
 }
 
-impl<'a> Builder<'a> {
-    fn new(options: &'a Options) -> Self {
+impl<'a> GraphBuilder<'a> {
+    fn new(options: &'a PoseGraphOptions) -> Self {
         Self {
             options,
             graph: Graph::new(),
             measured: Graph::new(),
             values: Values::new(),
-            report: Report::default(),
+            report: PoseGraphReport::default(),
             types: HashMap::new(),
             missing: BTreeMap::new(),
             sensors: HashMap::new(),
@@ -205,12 +205,12 @@ impl<'a> Builder<'a> {
     ) -> Result<(), Mistake> {
         match information.map(|m| noise(&m, self.options.repair)).transpose()? {
             None => {}
-            Some(Outcome::AsWritten(noise)) => entry.noise = of_factor(noise)?,
-            Some(Outcome::Clamped(noise)) => {
+            Some(EdgeNoise::AsWritten(noise)) => entry.noise = of_factor(noise)?,
+            Some(EdgeNoise::Clamped(noise)) => {
                 self.report.clamped.push(line);
                 entry.noise = of_factor(noise)?;
             }
-            Some(Outcome::Rejected) => {
+            Some(EdgeNoise::Rejected) => {
                 self.report.rejected.push(line);
                 return Ok(());
             }
@@ -305,7 +305,7 @@ impl<'a> Builder<'a> {
         self.fill()?;
         let steps = self.graph.factors().iter().filter(|entry| are_consecutive(&entry.keys));
         let steps = steps.filter_map(|entry| entry.factor.erased().as_any().downcast_ref::<Between<Se3>>());
-        self.report.doubts = plausible::relative_poses(steps.map(|step| &step.relative));
+        self.report.doubts = plausible::relative_pose_doubts(steps.map(|step| &step.relative));
         if self.options.anchor {
             let is_pose = |key: &Key| key.as_str().starts_with('x');
             self.report.anchored = anchors(&self.graph, &self.values, is_pose);

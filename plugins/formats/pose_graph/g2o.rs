@@ -29,7 +29,7 @@ use crate::tum::pose;
 use manifactor_geometry::{Point2, Point3, Se2, So2};
 
 mod write;
-pub use write::{Omitted, format, write};
+pub use write::{G2oOmissions, format, write};
 
 /// Returns the parser of a line with this tag.
 pub(crate) fn parser(tag: &str) -> Option<Parse> {

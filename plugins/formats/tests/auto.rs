@@ -1,5 +1,5 @@
 //! The default solver reaches the best known minimum of published pose graphs, without tuning.
-use manifactor_formats::pose_graph::{Options, read};
+use manifactor_formats::pose_graph::{PoseGraphOptions, read};
 use manifactor_graph::Graph;
 use manifactor_solve::{Auto, GaussNewton, Silent, solve};
 use std::path::PathBuf;
@@ -28,7 +28,7 @@ fn auto_reaches_the_best_known_minimum_of_every_graph() {
     };
     let mut missed = vec![];
     for (file, best) in BEST {
-        let graph = read(data.join("g2o").join(file), &Options::default()).unwrap();
+        let graph = read(data.join("g2o").join(file), &PoseGraphOptions::default()).unwrap();
         let outcome = solve(&graph.graph, &graph.values, &Auto::default(), &mut Silent).unwrap().outcome;
         println!("{file}: {} in {}, {}", outcome.final_cost, outcome.iterations, outcome.termination);
         // To the number of digits of the best known cost.
@@ -55,7 +55,7 @@ fn auto_takes_the_steps_of_gauss_newton_where_those_lead_to_the_best_minimum() {
     // On the remaining graphs, Gauss-Newton takes a different path from the file's values.
     let lead = BEST.iter().filter(|(file, _)| !["MIT.g2o", "torus3D.g2o"].contains(file));
     for (file, best) in lead {
-        let loaded = read(data.join("g2o").join(file), &Options::default()).unwrap();
+        let loaded = read(data.join("g2o").join(file), &PoseGraphOptions::default()).unwrap();
         let plain =
             solve(&loaded.graph, &loaded.values, &GaussNewton::default(), &mut Silent).unwrap().outcome;
         for times in [1.0, 4.0, 100.0] {

@@ -12,7 +12,7 @@ use nalgebra::{Vector2, Vector3};
 const TWO: &str = "2 1 2\n0 0 10.0 -20.0\n1 0 -90.0 -20.0\n\
     0 0 0 0 0 0 100 0 0\n0 0 0\n-1 0 0 100 0.0 0.0\n0.1 -0.2 -1.0\n";
 
-fn parse(text: &str) -> bal::Bundle {
+fn parse(text: &str) -> bal::BalProblem {
     bal::parse(text, "b", true).unwrap()
 }
 
@@ -112,15 +112,19 @@ fn mistakes_are_named_with_their_lines() {
 
 #[test]
 fn a_file_is_known_by_its_first_line() {
-    assert!(bal::begins("# made by hand\n 2 1 2 \n"));
-    assert!(!bal::begins("VERTEX_SE2 0 0 0 0\n") && !bal::begins("1 2 3 4") && !bal::begins(""));
+    assert!(bal::looks_like_bal("# made by hand\n 2 1 2 \n"));
+    assert!(
+        !bal::looks_like_bal("VERTEX_SE2 0 0 0 0\n")
+            && !bal::looks_like_bal("1 2 3 4")
+            && !bal::looks_like_bal("")
+    );
 }
 
 #[test]
 fn what_is_written_reads_back() {
     let (graph, values) = bundle(0.1);
     let (text, omitted) = bal::format(&graph, &values);
-    assert_eq!(omitted, bal::Omitted::default());
+    assert_eq!(omitted, bal::BalOmissions::default());
     let back = bal::parse(&text, "b", false).unwrap();
     assert_eq!(back.graph.factors().len(), graph.factors().len());
     for (a, b) in graph.factors().iter().zip(back.graph.factors()) {

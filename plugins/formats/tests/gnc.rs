@@ -1,5 +1,5 @@
 //! Graduated non-convexity on published pose graphs with added false loop closures.
-use manifactor_formats::pose_graph::{Options, PoseGraph, read};
+use manifactor_formats::pose_graph::{PoseGraph, PoseGraphOptions, read};
 use manifactor_geometry::{Between, Se2, Se3};
 use manifactor_graph::Key;
 use manifactor_solve::{Optimizer, Silent, Solution, solve};
@@ -14,12 +14,12 @@ fn published(file: &str) -> Option<PoseGraph> {
         eprintln!("skipped: MANIFACTOR_DATA does not name a folder with published data");
         return None;
     };
-    Some(read(root.join("g2o").join(file), &Options::default()).unwrap())
+    Some(read(root.join("g2o").join(file), &PoseGraphOptions::default()).unwrap())
 }
 
 /// Adds loop closures between random poses with random measurements of a few metres. Returns the original
 /// number of factors.
-fn mislead(loaded: &mut PoseGraph, n: usize, seed: u64) -> usize {
+fn add_false_loops(loaded: &mut PoseGraph, n: usize, seed: u64) -> usize {
     let factors = loaded.graph.factors().len();
     let noise = loaded.graph.factors()[0].noise.clone();
     let keys: Vec<Key> = loaded.values.iter().map(|(key, _)| key.clone()).collect();
@@ -51,7 +51,7 @@ fn cost(solution: &Solution, factors: usize) -> f64 {
 /// Rejected factors, the original number of factors, and the cost of the true ones; `None` without data.
 fn solved(file: &str, outliers: usize, seed: u64, solver: &str) -> Option<(Vec<usize>, usize, f64)> {
     let mut loaded = published(file)?;
-    let factors = mislead(&mut loaded, outliers, seed);
+    let factors = add_false_loops(&mut loaded, outliers, seed);
     let solver: Box<dyn Optimizer> = serde_json::from_str(solver).unwrap();
     let solution = solve(&loaded.graph, &loaded.values, &*solver, &mut Silent).unwrap();
     let outcome = &solution.outcome;

@@ -1,6 +1,6 @@
 //! Published pose graphs through the smoother, pose by pose, compared with batch solves.
-use manifactor_formats::pose_graph::{self, Options, PoseGraph};
-use manifactor_formats::replay::Replay;
+use manifactor_formats::pose_graph::{self, PoseGraph, PoseGraphOptions};
+use manifactor_formats::replay::GraphReplay;
 use manifactor_geometry::{Between, Point2, Range, Se2, Se3};
 use manifactor_graph::checked::{NotNegative, Positive};
 use manifactor_graph::loss::Cauchy;
@@ -23,7 +23,7 @@ fn data(path: &str) -> Option<PathBuf> {
 /// Runs at most this number of steps, and returns the smoother and its last report.
 fn replay(graph: &Graph, most: usize) -> (Smoother, UpdateReport) {
     let mut session = Smoother::new(SmootherSettings::default());
-    let (mut steps, mut report) = (Replay::of(graph, &Values::new()), UpdateReport::default());
+    let (mut steps, mut report) = (GraphReplay::of(graph, &Values::new()), UpdateReport::default());
     for _ in 0..most {
         let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
         session.push(&step.factors, &step.values).unwrap();
@@ -39,7 +39,7 @@ fn the_estimate_is_close_to_the_optimum_and_finish_is_there() {
         [("intel", 600, 1e-3), ("parking-garage", 700, 0.05), ("input_M3500_g2o", 600, 2e-3)]
     {
         let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
-        let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+        let graph = pose_graph::read(path, &PoseGraphOptions::default()).unwrap().graph;
         let (mut session, report) = replay(&graph, most);
         assert!(
             report.undetermined_variables.is_empty() && report.undetermined_directions.is_empty(),
@@ -57,7 +57,7 @@ fn the_estimate_is_close_to_the_optimum_and_finish_is_there() {
 #[test]
 fn a_covariance_from_the_fronts_is_that_of_a_batch() {
     let Some(path) = data("g2o/intel.g2o") else { return };
-    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let graph = pose_graph::read(path, &PoseGraphOptions::default()).unwrap().graph;
     let (session, _) = replay(&graph, 300);
     let keys = ["x299", "x17"];
     let mut problem = Problem::compile(&session.graph().0, &session.estimates()).unwrap();
@@ -70,7 +70,7 @@ fn a_covariance_from_the_fronts_is_that_of_a_batch() {
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let Some(path) = data("g2o/parking-garage.g2o") else { return };
-    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let graph = pose_graph::read(path, &PoseGraphOptions::default()).unwrap().graph;
     let bits = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let session = pool.install(|| replay(&graph, 250).0);
@@ -85,9 +85,9 @@ fn any_number_of_threads_gives_the_same_bits() {
 fn a_replay_goes_on_after_a_restart_bit_for_bit() {
     for name in ["intel", "parking-garage", "input_M3500_g2o"] {
         let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
-        let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
+        let PoseGraph { graph, values, .. } = pose_graph::read(path, &PoseGraphOptions::default()).unwrap();
         let (mut steps, mut session) =
-            (Replay::of(&graph, &values), Smoother::new(SmootherSettings::default()));
+            (GraphReplay::of(&graph, &values), Smoother::new(SmootherSettings::default()));
         let mut other = None;
         for n in 0..400 {
             let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
@@ -112,11 +112,11 @@ fn a_replay_goes_on_after_a_restart_bit_for_bit() {
 #[test]
 fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
     let Some(path) = data("g2o/input_M3500_g2o.g2o") else { return };
-    let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
+    let PoseGraph { graph, values, .. } = pose_graph::read(path, &PoseGraphOptions::default()).unwrap();
     let run = |budget: Option<f64>| {
         let budget = budget.map(NotNegative::literal);
         let mut session = Smoother::new(SmootherSettings { budget, ..SmootherSettings::default() });
-        let (mut steps, mut reports) = (Replay::of(&graph, &values), vec![]);
+        let (mut steps, mut reports) = (GraphReplay::of(&graph, &values), vec![]);
         for _ in 0..1000 {
             let step = steps.step(|key| session.estimate(key)).unwrap().unwrap();
             session.push(&step.factors, &step.values).unwrap();
@@ -151,10 +151,10 @@ fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
 #[test]
 fn a_window_that_holds_all_closures_is_as_good_as_all() {
     let Some(path) = data("g2o/sphere2500.g2o") else { return };
-    let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
+    let PoseGraph { graph, values, .. } = pose_graph::read(path, &PoseGraphOptions::default()).unwrap();
     let window = Some(Window::from(Span::Poses(NonZeroUsize::new(120).unwrap())));
     let mut narrow = Smoother::new(SmootherSettings { window, ..SmootherSettings::default() });
-    let (mut all, mut steps) = (Smoother::new(SmootherSettings::default()), Replay::of(&graph, &values));
+    let (mut all, mut steps) = (Smoother::new(SmootherSettings::default()), GraphReplay::of(&graph, &values));
     let mut bytes = vec![];
     for n in 0..500 {
         let step = steps.step(|key| all.estimate(key)).unwrap().unwrap();

@@ -1,5 +1,5 @@
 //! Pose-graph reader: valid and malformed lines.
-use manifactor_formats::pose_graph::{Options, PoseGraph, Repair, parse};
+use manifactor_formats::pose_graph::{InformationRepair, PoseGraph, PoseGraphOptions, parse};
 use manifactor_geometry::{Between, Landmark, Point2, Point3, Se2, Se3, Tree};
 use manifactor_graph::{Factor, Fixed, Key};
 use manifactor_solve::Problem;
@@ -9,11 +9,11 @@ use std::any::Any;
 const EDGE: &str = "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n";
 
 fn read(text: &str) -> PoseGraph {
-    parse(text, "g.g2o", &Options::default()).unwrap()
+    parse(text, "g.g2o", &PoseGraphOptions::default()).unwrap()
 }
 
 fn errors(text: &str) -> String {
-    parse(text, "g.g2o", &Options::default()).unwrap_err().to_string()
+    parse(text, "g.g2o", &PoseGraphOptions::default()).unwrap_err().to_string()
 }
 
 fn factor<F: Any>(loaded: &PoseGraph, i: usize) -> &F {
@@ -106,7 +106,8 @@ fn unknown_tags_are_named_once_and_counted() {
     let expected = "g.g2o:2: unknown tags, 3 lines: `EDGE_PRIOR`, `edge_se2`; check their spelling, or leave these lines out with \
                     --lenient";
     assert_eq!(errors(&text), expected);
-    let loaded = parse(&text, "g", &Options { lenient: true, ..Options::default() }).unwrap();
+    let loaded =
+        parse(&text, "g", &PoseGraphOptions { lenient: true, ..PoseGraphOptions::default() }).unwrap();
     let unknown: Vec<_> = loaded.report.unknown.iter().map(|(tag, n)| (tag.as_str(), *n)).collect();
     assert_eq!(unknown, [("EDGE_PRIOR", 2), ("edge_se2", 1)]);
     assert_eq!(loaded.graph.factors().len(), 1);
@@ -117,7 +118,7 @@ fn many_unknown_tags_are_counted_and_ten_are_named() {
     let tags: String = (0..500).map(|i| format!("TAG_{i}_{} 1\n", "X".repeat(300))).collect();
     let error = errors(&format!("{EDGE}{tags}"));
     assert!(error.contains("500 lines") && error.len() < 1000, "{error}");
-    let options = Options { lenient: true, ..Options::default() };
+    let options = PoseGraphOptions { lenient: true, ..PoseGraphOptions::default() };
     let notes = parse(format!("{EDGE}{tags}").as_str(), "g", &options).unwrap().report.notes();
     assert!(notes.iter().any(|note| note == "490 more unknown tags: 490 lines left out"), "{notes:?}");
 }
@@ -151,7 +152,12 @@ fn absolute_measurements_are_written_and_read_back() {
     assert!(omitted.factors.is_empty(), "{:?}", omitted.factors);
     assert!((cost(&written) - cost(text)).abs() < 1e-12 * cost(text), "{written}");
     let none = text.replace("0.3 100", "0.3 0");
-    let repaired = parse(&none, "g", &Options { repair: Repair::Reject, ..Options::default() }).unwrap();
+    let repaired = parse(
+        &none,
+        "g",
+        &PoseGraphOptions { repair: InformationRepair::Reject, ..PoseGraphOptions::default() },
+    )
+    .unwrap();
     assert_eq!((repaired.graph.factors().len(), repaired.report.rejected.len()), (3, 1));
 }
 
@@ -198,11 +204,11 @@ fn edges_after_a_comment_or_a_fix_are_read() {
 #[test]
 fn what_is_not_positive_definite_is_repaired_by_policy_and_counted() {
     let text = format!("{EDGE}EDGE_SE2 1 2 1 0 0 1 0 0 -1 0 1\nEDGE_SE2 1 2 1 0 0 0 0 0 0 0 0\n");
-    let repair = |repair| parse(&text, "g", &Options { repair, ..Options::default() });
-    assert!(repair(Repair::Error).is_err());
-    let rejected = repair(Repair::Reject).unwrap();
+    let repair = |repair| parse(&text, "g", &PoseGraphOptions { repair, ..PoseGraphOptions::default() });
+    assert!(repair(InformationRepair::Error).is_err());
+    let rejected = repair(InformationRepair::Reject).unwrap();
     assert_eq!((rejected.graph.factors().len(), rejected.report.rejected), (1, vec![2, 3]));
-    let clamped = repair(Repair::Clamp).unwrap();
+    let clamped = repair(InformationRepair::Clamp).unwrap();
     assert_eq!((clamped.report.clamped, clamped.report.rejected), (vec![2], vec![3]));
     assert_eq!(clamped.graph.factors().len(), 2);
     // The vertex is still placed along the omitted edge. It is held, as no other factor constrains it.
@@ -234,7 +240,7 @@ fn a_pose_that_only_sees_points_starts_at_the_origin() {
 fn the_spanning_tree_is_chosen_by_an_option() {
     let text = format!("{EDGE}EDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\nEDGE_SE2 0 2 3 0 0 1 0 0 1 0 1\n");
     let x2 = |tree| {
-        let loaded = parse(&text, "g", &Options { tree, ..Options::default() }).unwrap();
+        let loaded = parse(&text, "g", &PoseGraphOptions { tree, ..PoseGraphOptions::default() }).unwrap();
         loaded.values.get::<Se2>("x2").unwrap().translation.x
     };
     assert_eq!((x2(Tree::Chain), x2(Tree::Shallow)), (2.0, 3.0));
@@ -245,7 +251,7 @@ fn each_connected_part_is_held_once() {
     let text = format!("{EDGE}EDGE_SE2 7 8 1 0 0 1 0 0 1 0 1\nEDGE_SE2 2 8 1 0 0 1 0 0 1 0 1\n");
     assert_eq!(read(&text).report.anchored, keys(&["x0", "x2"]));
     assert_eq!(read(&format!("{text}FIX 7\n")).report.anchored, keys(&["x0"]));
-    let free = parse(&text, "g", &Options { anchor: false, ..Options::default() }).unwrap();
+    let free = parse(&text, "g", &PoseGraphOptions { anchor: false, ..PoseGraphOptions::default() }).unwrap();
     assert!(free.graph.fixed().is_empty() && free.report.anchored.is_empty());
 }
 

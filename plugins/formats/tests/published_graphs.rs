@@ -1,5 +1,5 @@
 //! Published pose graphs in `MANIFACTOR_DATA/g2o`: their size, and their cost at the initial values.
-use manifactor_formats::pose_graph::{self, Options, PoseGraph};
+use manifactor_formats::pose_graph::{self, PoseGraph, PoseGraphOptions};
 use std::path::PathBuf;
 
 /// The folder of pose graphs; prints a note and returns `None` if the variable is not set.
@@ -49,7 +49,7 @@ fn every_published_graph_loads_and_costs_what_it_should() {
     let Some(folder) = folder() else { return };
     let mut failures = vec![];
     for (file, vertices, edges, variables, known_cost) in GRAPHS {
-        let loaded = pose_graph::read(folder.join(file), &Options::default()).unwrap();
+        let loaded = pose_graph::read(folder.join(file), &PoseGraphOptions::default()).unwrap();
         let found = (loaded.report.vertices, loaded.report.edges, loaded.values.len());
         let cost = cost(&loaded);
         println!("{file}: {found:?} {} factors, cost {cost:?}", loaded.graph.factors().len());

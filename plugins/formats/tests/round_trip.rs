@@ -4,11 +4,11 @@ use manifactor_geometry::{Between, Landmark, Point2, Point3, Prior, Se2, Se3, So
 use manifactor_graph::loss::Huber;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
 use nalgebra::{DMatrix, Vector2, Vector3, Vector6};
-use pose_graph::Options;
+use pose_graph::PoseGraphOptions;
 use proptest::prelude::*;
 
 fn parse(text: &str) -> pose_graph::PoseGraph {
-    pose_graph::parse(text, "g", &Options { anchor: false, ..Options::default() }).unwrap()
+    pose_graph::parse(text, "g", &PoseGraphOptions { anchor: false, ..PoseGraphOptions::default() }).unwrap()
 }
 
 /// A positive definite matrix of `n` rows from arbitrary numbers.
@@ -53,7 +53,7 @@ proptest! {
         graph.fix("x0");
 
         let (text, omitted) = g2o::format(&graph, &values);
-        prop_assert_eq!(omitted, g2o::Omitted::default());
+        prop_assert_eq!(omitted, g2o::G2oOmissions::default());
         let back = parse(&text);
         prop_assert_eq!(json(&back.graph, &back.values), json(&graph, &values));
     }
@@ -61,11 +61,11 @@ proptest! {
     #[test]
     fn no_text_makes_the_reader_panic(
         lines in prop::collection::vec((0..8usize, "[-0-9. enx]{0,40}"), 0..8),
-        repair in prop::sample::select(vec![pose_graph::Repair::Clamp, pose_graph::Repair::Reject]),
+        repair in prop::sample::select(vec![pose_graph::InformationRepair::Clamp, pose_graph::InformationRepair::Reject]),
     ) {
         let tags = ["VERTEX_SE2", "EDGE_SE2", "VERTEX_SE3:QUAT", "EDGE_SE2_XY", "FIX", "EQUIV", "EDGE2", "?"];
         let text: String = lines.iter().map(|(tag, rest)| format!("{} {rest}\n", tags[*tag])).collect();
-        let _ = pose_graph::parse(&text, "g", &Options { repair, ..Options::default() });
+        let _ = pose_graph::parse(&text, "g", &PoseGraphOptions { repair, ..PoseGraphOptions::default() });
     }
 }
 

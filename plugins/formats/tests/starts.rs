@@ -1,5 +1,5 @@
 //! Published pose graphs in `MANIFACTOR_DATA/g2o` reach the best known cost from a chordal start.
-use manifactor_formats::pose_graph::{self, Options};
+use manifactor_formats::pose_graph::{self, PoseGraphOptions};
 use manifactor_geometry::{Chordal, SpanningTree, Tree, certify};
 use manifactor_graph::Graph;
 use manifactor_solve::{
@@ -13,7 +13,7 @@ fn solved(file: &str, start: &dyn Start, optimizer: &dyn Optimizer) -> Option<(G
         return None;
     };
     let path = std::path::Path::new(&root).join("g2o").join(file);
-    let loaded = pose_graph::read(path, &Options::default()).unwrap();
+    let loaded = pose_graph::read(path, &PoseGraphOptions::default()).unwrap();
     let values = start.start(&loaded.graph, &loaded.values).unwrap();
     let solution = solve(&loaded.graph, &values, optimizer, &mut Silent).unwrap();
     let outcome = &solution.outcome;

@@ -2,22 +2,22 @@
 use manifactor_geometry::Se3;
 
 /// Minimum number of steps between poses for a meaningful median.
-const ENOUGH: usize = 3;
+const MIN_STEPS: usize = 3;
 /// Largest plausible distance between poses, in metres.
-const FAR: f64 = 100.0;
+const MAX_DISTANCE_M: f64 = 100.0;
 /// Largest plausible speed, in metres per second.
-const FAST: f64 = 50.0;
+const MAX_SPEED: f64 = 50.0;
 /// Largest plausible time between frames, in seconds.
-const SLOW: f64 = 10.0;
+const MAX_INTERVAL_S: f64 = 10.0;
 /// Smallest x entry of a quaternion that counts as nearly half a turn about x.
-const HALF_TURN: f64 = 0.9;
+const MIN_HALF_TURN_X: f64 = 0.9;
 
 /// Returns doubts about poses that are relative to the previous one, as text.
-pub fn relative_poses<'a>(relative: impl Iterator<Item = &'a Se3>) -> Vec<String> {
+pub fn relative_pose_doubts<'a>(relative: impl Iterator<Item = &'a Se3>) -> Vec<String> {
     let (lengths, turned): (Vec<f64>, Vec<bool>) =
         relative.map(|step| (step.translation.norm(), is_turned(step))).unzip();
     let mut doubts = vec![];
-    if lengths.len() < ENOUGH {
+    if lengths.len() < MIN_STEPS {
         return doubts;
     }
     if 2 * turned.iter().filter(|turned| **turned).count() > turned.len() {
@@ -28,7 +28,7 @@ pub fn relative_poses<'a>(relative: impl Iterator<Item = &'a Se3>) -> Vec<String
         );
     }
     let length = median(lengths);
-    if length > FAR {
+    if length > MAX_DISTANCE_M {
         doubts.push(format!(
             "by the median, a pose is {length:.0} m from the one before: lengths are metres here; are these millimetres?"
         ));
@@ -37,10 +37,10 @@ pub fn relative_poses<'a>(relative: impl Iterator<Item = &'a Se3>) -> Vec<String
 }
 
 /// Returns doubts about a trajectory with times in seconds, as text.
-pub fn trajectory(poses: impl Iterator<Item = (f64, Se3)>) -> Vec<String> {
+pub fn trajectory_doubts(poses: impl Iterator<Item = (f64, Se3)>) -> Vec<String> {
     let poses: Vec<(f64, Se3)> = poses.collect();
     let mut doubts = vec![];
-    if poses.len() <= ENOUGH {
+    if poses.len() <= MIN_STEPS {
         return doubts;
     }
     // Odometry usually begins at its origin, with the identity quaternion.
@@ -57,13 +57,13 @@ pub fn trajectory(poses: impl Iterator<Item = (f64, Se3)>) -> Vec<String> {
     });
     let (times, speeds): (Vec<f64>, Vec<f64>) = steps.map(|(t, length)| (t, length / t)).unzip();
     let (time, speed) = (median(times), median(speeds));
-    if time > SLOW {
+    if time > MAX_INTERVAL_S {
         doubts.push(format!(
             "by the median, a frame is {time:.3e} s after the one before: time stamps are seconds here; are these milli- or \
              nanoseconds?"
         ));
     }
-    if speed > FAST {
+    if speed > MAX_SPEED {
         doubts.push(format!(
             "by the median, the camera moves at {speed:.0} m/s: lengths are metres here; are these millimetres?"
         ));
@@ -72,7 +72,7 @@ pub fn trajectory(poses: impl Iterator<Item = (f64, Se3)>) -> Vec<String> {
 }
 
 fn is_turned(step: &Se3) -> bool {
-    step.rotation.quaternion_xyzw()[0].abs() > HALF_TURN
+    step.rotation.quaternion_xyzw()[0].abs() > MIN_HALF_TURN_X
 }
 
 /// Returns the median; 0 for an empty list.
@@ -93,7 +93,7 @@ mod tests {
         (0..9).map(|i| at(f64::from(i))).collect()
     }
     fn doubts(xyzw: [f64; 4], unit: f64, second: f64) -> String {
-        trajectory(walk(xyzw, unit, second).into_iter()).join("; ")
+        trajectory_doubts(walk(xyzw, unit, second).into_iter()).join("; ")
     }
 
     #[test]
@@ -109,10 +109,10 @@ mod tests {
     #[test]
     fn steps_are_looked_at_without_time_too() {
         let step = |xyzw, length| Se3::new(So3::from_quaternion_xyzw(xyzw).unwrap(), Vector3::x() * length);
-        let steps = |xyzw, length| relative_poses([step(xyzw, length); 5].iter()).join("; ");
+        let steps = |xyzw, length| relative_pose_doubts([step(xyzw, length); 5].iter()).join("; ");
         assert_eq!(steps([0.1, 0.0, 0.0, 0.995], 1.0), "");
         assert!(steps([0.995, 0.1, 0.0, 0.0], 1.0).contains("are these w x y z?"));
         assert!(steps([0.0, 0.0, 0.0, 1.0], 1000.0).contains("are these millimetres?"));
-        assert_eq!(relative_poses([].iter()), Vec::<String>::new());
+        assert_eq!(relative_pose_doubts([].iter()), Vec::<String>::new());
     }
 }

@@ -3,19 +3,19 @@
 //! A killed program leaves at most one incomplete line, the last; it is dropped when the file is opened
 //! again. A file that is not a journal of these records, has a different key or has a damaged line is refused
 //! and not modified.
-use super::{CHECKED, checked_line, open_regular, read_checked_line, read_regular};
+use super::{CHECKED_LINE_START, checked_line, open_regular, read_checked_line, read_regular};
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Write};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 /// A record type of a journal.
-pub trait Record: Sized {
+pub trait JournalRecord: Sized {
     /// Name of the records in messages.
     const NAME: &'static str;
     /// Beginnings of a header line with the journal's key: the current one, then earlier versions. Empty for
     /// journals without a key.
-    const BEGINNINGS: &'static [&'static str] = &[];
+    const HEADER_STARTS: &'static [&'static str] = &[];
 
     /// Formats the record as a JSON object on one line, without the line break.
     ///
@@ -87,7 +87,7 @@ pub struct Journal<R> {
     records: PhantomData<R>,
 }
 
-impl<R: Record> Journal<R> {
+impl<R: JournalRecord> Journal<R> {
     /// Opens or creates a journal, and returns its records. If the record type has a key, it is checked.
     ///
     /// # Errors
@@ -96,7 +96,7 @@ impl<R: Record> Journal<R> {
     pub fn open(path: &Path, key: &str) -> Result<(Self, Vec<R>), JournalError> {
         let io = |source| JournalError::Io { path: path.to_owned(), source };
         let mut file = open_regular(path).map_err(io)?;
-        let header = R::BEGINNINGS.first().map_or_else(String::new, |begin| format!("{begin}{key}\"}}\n"));
+        let header = R::HEADER_STARTS.first().map_or_else(String::new, |begin| format!("{begin}{key}\"}}\n"));
         if !header.is_empty() {
             file.try_lock().map_err(|error| match error {
                 TryLockError::WouldBlock => JournalError::InUse { path: path.to_owned() },
@@ -111,7 +111,7 @@ impl<R: Record> Journal<R> {
         }
         let Some(lines) = bytes.strip_prefix(header.as_bytes()) else {
             let path = path.to_owned();
-            let is_ours = R::BEGINNINGS.iter().any(|beginning| bytes.starts_with(beginning.as_bytes()));
+            let is_ours = R::HEADER_STARTS.iter().any(|beginning| bytes.starts_with(beginning.as_bytes()));
             return Err(match is_ours {
                 true => JournalError::OtherKey { path },
                 false => JournalError::NoJournal { path, record: R::NAME },
@@ -159,7 +159,7 @@ impl<R: Record> Journal<R> {
 ///
 /// # Errors
 /// If the file cannot be read or is not such a journal.
-pub fn read<R: Record>(path: &Path) -> Result<Vec<R>, JournalError> {
+pub fn read<R: JournalRecord>(path: &Path) -> Result<Vec<R>, JournalError> {
     match read_regular(path) {
         Ok(bytes) => Ok(records(&bytes, false, path)?.0),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(vec![]),
@@ -169,7 +169,11 @@ pub fn read<R: Record>(path: &Path) -> Result<Vec<R>, JournalError> {
 
 /// Returns the records, and the number of bytes of complete lines. With a header, an incomplete last line is
 /// a torn record.
-fn records<R: Record>(lines: &[u8], has_header: bool, path: &Path) -> Result<(Vec<R>, usize), JournalError> {
+fn records<R: JournalRecord>(
+    lines: &[u8],
+    has_header: bool,
+    path: &Path,
+) -> Result<(Vec<R>, usize), JournalError> {
     let mut records = vec![];
     let mut whole = 0;
     for (i, line) in lines.split_inclusive(|byte| *byte == b'\n').enumerate() {
@@ -194,6 +198,7 @@ fn records<R: Record>(lines: &[u8], has_header: bool, path: &Path) -> Result<(Ve
 
 /// Returns whether a line is the beginning of a record.
 fn is_torn(line: &[u8]) -> bool {
-    let begins = line.starts_with(CHECKED.as_bytes()) || CHECKED.as_bytes().starts_with(line);
+    let begins =
+        line.starts_with(CHECKED_LINE_START.as_bytes()) || CHECKED_LINE_START.as_bytes().starts_with(line);
     begins && serde_json::from_slice::<serde_json::Value>(line).err().is_none_or(|error| error.is_eof())
 }

@@ -51,7 +51,7 @@ struct Document {
 }
 
 /// Smallest depth of a point in front of the camera, as a share of its distance.
-const MARGIN: f64 = 1e-6;
+const MIN_RELATIVE_DEPTH: f64 = 1e-6;
 
 impl<T: Scalar> BalCamera<T> {
     /// 1 + k1 ρ + k2 ρ², ρ = ‖p‖².
@@ -73,7 +73,7 @@ impl BalCamera {
     /// its distance.
     #[inline(always)]
     pub fn is_in_front(point: &Vector3<f64>) -> bool {
-        point.z < 0.0 && point.z * point.z > MARGIN * MARGIN * point.norm_squared()
+        point.z < 0.0 && point.z * point.z > MIN_RELATIVE_DEPTH * MIN_RELATIVE_DEPTH * point.norm_squared()
     }
 }
 

@@ -64,7 +64,7 @@ fn is_zero(x: &f64) -> bool {
 /// An invalid camera parameter.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("camera: expected {field} to be {expected}, got {found}")]
-pub struct NotACamera {
+pub struct CameraError {
     /// The parameter.
     pub field: &'static str,
     /// The allowed values.
@@ -78,20 +78,20 @@ impl Camera {
     ///
     /// # Errors
     /// If a focal length or a size is not positive, or a number not finite.
-    pub fn new([fx, fy, cx, cy]: [f64; 4], width: u32, height: u32) -> Result<Self, NotACamera> {
+    pub fn new([fx, fy, cx, cy]: [f64; 4], width: u32, height: u32) -> Result<Self, CameraError> {
         Self { fx, fy, cx, cy, skew: 0.0, width, height }.checked()
     }
 
-    fn checked(self) -> Result<Self, NotACamera> {
+    fn checked(self) -> Result<Self, CameraError> {
         let size = [("width", f64::from(self.width)), ("height", f64::from(self.height))];
         for (field, found) in [("fx", self.fx), ("fy", self.fy)].into_iter().chain(size) {
             if !(found > 0.0 && found.is_finite()) {
-                return Err(NotACamera { field, expected: "a finite number above zero", found });
+                return Err(CameraError { field, expected: "a finite number above zero", found });
             }
         }
         for (field, found) in [("cx", self.cx), ("cy", self.cy), ("skew", self.skew)] {
             if !found.is_finite() {
-                return Err(NotACamera { field, expected: "a finite number", found });
+                return Err(CameraError { field, expected: "a finite number", found });
             }
         }
         Ok(self)
@@ -118,10 +118,9 @@ impl Camera {
 }
 
 /// Smallest depth of a point in front of the camera, as a share of its distance.
-const MARGIN: f64 = 1e-6;
+const MIN_RELATIVE_DEPTH: f64 = 1e-6;
 
 impl CameraModel for Camera {
-    const PROJECTION: &'static str = "projection";
     const EXAMPLE: &'static str =
         "{ fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
 
@@ -137,7 +136,7 @@ impl CameraModel for Camera {
 
     #[inline(always)]
     fn sees(&self, point: &Vector3<f64>) -> bool {
-        point.z > 0.0 && point.z * point.z > MARGIN * MARGIN * point.norm_squared()
+        point.z > 0.0 && point.z * point.z > MIN_RELATIVE_DEPTH * MIN_RELATIVE_DEPTH * point.norm_squared()
     }
 
     fn pinhole(&self) -> Camera {
@@ -155,8 +154,8 @@ impl CameraModel for Camera {
 register_camera!("pinhole", "projection", Camera);
 
 impl TryFrom<Document> for Camera {
-    type Error = NotACamera;
-    fn try_from(d: Document) -> Result<Self, NotACamera> {
+    type Error = CameraError;
+    fn try_from(d: Document) -> Result<Self, CameraError> {
         let Document { fx, fy, cx, cy, skew, width, height } = d;
         Self { fx, fy, cx, cy, skew, width, height }.checked()
     }

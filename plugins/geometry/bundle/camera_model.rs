@@ -14,8 +14,6 @@ use std::fmt::Debug;
 pub trait CameraModel:
     Clone + Debug + PartialEq + Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'static
 {
-    /// Name of this model's [`Projection`](crate::Projection) factor in documents.
-    const PROJECTION: &'static str;
     /// A camera in the inline TOML form used inside a factor; an example for the catalogue.
     const EXAMPLE: &'static str;
 
@@ -59,6 +57,14 @@ pub trait AnyCamera: Debug + Send + Sync {
 
 manifactor_graph::kind!(dyn AnyCamera, "camera");
 
+/// Name of a model's [`Projection`](crate::Projection) factor in documents. Implemented by
+/// [`register_camera!`](crate::register_camera).
+#[doc(hidden)]
+pub trait ProjectionName {
+    /// The name.
+    const PROJECTION: &'static str;
+}
+
 /// Maps a pixel of a camera to the rectified image; `None` for a direction that no pinhole camera can see.
 #[doc(hidden)]
 pub fn rectify<M: CameraModel>(camera: &M, pixel: &Vector2<f64>) -> Option<Vector2<f64>> {
@@ -71,6 +77,9 @@ pub fn rectify<M: CameraModel>(camera: &M, pixel: &Vector2<f64>) -> Option<Vecto
 #[macro_export]
 macro_rules! register_camera {
     ($name:literal, $projection:literal, $type:ty) => {
+        impl $crate::__private::ProjectionName for $type {
+            const PROJECTION: &'static str = $projection;
+        }
         const _: () = {
             use $crate::__private::manifactor_graph::__private::typetag;
             #[typetag::serialize(name = $name)]

@@ -1,11 +1,12 @@
 //! Projection of a point into a calibrated camera.
+use crate::bundle::camera_model::ProjectionName;
 use crate::{Camera, CameraModel, Coordinates, Point3, Se3};
 use manifactor_graph::prelude::*;
 
 /// A camera measures a point at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, bound = "M: CameraModel")]
-#[schemars(bound = "M: CameraModel", description = description::<M>())]
+#[schemars(bound = "M: CameraModel + ProjectionName", description = description::<M>())]
 pub struct Projection<M = Camera> {
     /// Measured pixel, x right and y down.
     pub pixel: Coordinates<2>,
@@ -13,7 +14,7 @@ pub struct Projection<M = Camera> {
     pub camera: M,
 }
 
-fn description<M: CameraModel>() -> String {
+fn description<M: CameraModel + ProjectionName>() -> String {
     format!(
         "The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.\n\nVariables: the pose of the camera, from its own frame (z \
          forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if \
@@ -71,16 +72,16 @@ mod tests {
     fn at(pixel: Vector2<f64>) -> Projection {
         Projection { pixel: Coordinates::new(pixel).unwrap(), camera: camera() }
     }
-    fn seen() -> impl Strategy<Value = (Projection, Se3, Point3)> {
+    fn any_projection() -> impl Strategy<Value = (Projection, Se3, Point3)> {
         (vector(500.0), any_se3(), in_front())
             .prop_map(|(pixel, pose, p)| (at(pixel), pose, Point3::new(pose.act(&p))))
     }
 
-    jacobian_laws! { jacobians_agree: seen() }
+    jacobian_laws! { jacobians_agree: any_projection() }
 
     #[test]
     fn moving_pose_and_point_together_changes_nothing() {
-        check((seen(), any_se3()), |((factor, pose, point), m)| {
+        check((any_projection(), any_se3()), |((factor, pose, point), m)| {
             invariance_law(&factor, &[&pose, &point], &[&m.compose(&pose), &Point3::new(m.act(&point))])
         });
     }

@@ -78,18 +78,18 @@ mod tests {
     use nalgebra::Vector3;
     use proptest::prelude::*;
 
-    fn seen() -> impl Strategy<Value = (ProjectionBal, BalCamera, Point3)> {
+    fn any_projection() -> impl Strategy<Value = (ProjectionBal, BalCamera, Point3)> {
         (vector(500.0), any_bal_camera(), in_front()).prop_map(|(pixel, camera, p)| {
             let point = camera.world_from_camera.act(&Vector3::new(p.x, p.y, -p.z));
             (ProjectionBal { pixel: Coordinates::new(pixel).unwrap() }, camera, Point3::new(point))
         })
     }
 
-    jacobian_laws! { jacobians_agree: seen() }
+    jacobian_laws! { jacobians_agree: any_projection() }
 
     #[test]
     fn moving_camera_and_point_together_changes_nothing() {
-        check((seen(), any_se3()), |((factor, camera, point), m)| {
+        check((any_projection(), any_se3()), |((factor, camera, point), m)| {
             let moved = BalCamera { world_from_camera: m.compose(&camera.world_from_camera), ..camera };
             invariance_law(&factor, &[&camera, &point], &[&moved, &Point3::new(m.act(&point))])
         });
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn scaling_the_scene_about_the_camera_changes_nothing() {
-        check((seen(), 0.5..2.0f64), |((factor, camera, point), scale)| {
+        check((any_projection(), 0.5..2.0f64), |((factor, camera, point), scale)| {
             let centre = camera.world_from_camera.translation;
             let scaled = Point3::new(centre + (*point - centre) * scale);
             invariance_law(&factor, &[&camera, &point], &[&camera, &scaled])

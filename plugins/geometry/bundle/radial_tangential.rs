@@ -1,5 +1,5 @@
 //! Camera with radial and tangential lens distortion.
-use crate::{Camera, CameraModel, Coordinates, NotACamera, register_camera};
+use crate::{Camera, CameraError, CameraModel, Coordinates, register_camera};
 use manifactor_graph::Scalar;
 use nalgebra::{Vector2, Vector3};
 use schemars::JsonSchema;
@@ -50,17 +50,17 @@ struct Document {
 }
 
 /// Maximum number of fixed-point iterations of `unproject`, and its tolerance in units of the focal length.
-const STEPS: usize = 100;
-const NEAR: f64 = 1e-9;
+const MAX_ITERATIONS: usize = 100;
+const UNPROJECT_TOLERANCE: f64 = 1e-9;
 
 impl RadialTangential {
     /// Creates a camera with the coefficients k₁, k₂, p₁, p₂, k₃ in OpenCV's order.
     pub fn new(pinhole: Camera, distortion: [f64; 5]) -> Self {
-        Self { pinhole, distortion, limit: limit(distortion) }
+        Self { pinhole, distortion, limit: fold_limit(distortion) }
     }
 
     /// Applies the distortion to the point (x/z, y/z), in units of the focal length from the principal point.
-    fn bent<T: Scalar>(&self, [x, y]: [T; 2]) -> [T; 2] {
+    fn distort<T: Scalar>(&self, [x, y]: [T; 2]) -> [T; 2] {
         let [k1, k2, p1, p2, k3] = self.distortion.map(T::from);
         let [one, two] = [T::from(1.0), T::from(2.0)];
         let r2 = x * x + y * y;
@@ -72,22 +72,22 @@ impl RadialTangential {
 }
 
 /// Number of samples of the search for the fold, and bisections of the interval that contains it.
-const SCANNED: u32 = 10_000;
-const HALVINGS: usize = 60;
+const FOLD_SAMPLES: u32 = 10_000;
+const FOLD_BISECTIONS: usize = 60;
 
 /// Returns the smallest s = r² > 0 at which r (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) stops growing with r; infinite if
 /// it never does.
-fn limit([k1, k2, _, _, k3]: [f64; 5]) -> f64 {
+fn fold_limit([k1, k2, _, _, k3]: [f64; 5]) -> f64 {
     // With t = 1/s the derivative is t³ + 3 k₁ t² + 5 k₂ t + 7 k₃, and positive at `bound`, above its largest
     // root.
     let grows = |t: f64| t * (t * (t + 3.0 * k1) + 5.0 * k2) + 7.0 * k3 > 0.0;
     let bound = 1.0 + (3.0 * k1).abs().max((5.0 * k2).abs()).max((7.0 * k3).abs());
-    let at = |i: u32| bound * f64::from(i) / f64::from(SCANNED);
-    let Some(first) = (0..SCANNED).rev().find(|i| !grows(at(*i))).filter(|i| *i > 0) else {
+    let at = |i: u32| bound * f64::from(i) / f64::from(FOLD_SAMPLES);
+    let Some(first) = (0..FOLD_SAMPLES).rev().find(|i| !grows(at(*i))).filter(|i| *i > 0) else {
         return f64::INFINITY;
     };
     let [mut low, mut high] = [at(first), at(first + 1)];
-    for _ in 0..HALVINGS {
+    for _ in 0..FOLD_BISECTIONS {
         let middle = 0.5 * (low + high);
         *(if grows(middle) { &mut high } else { &mut low }) = middle;
     }
@@ -95,24 +95,23 @@ fn limit([k1, k2, _, _, k3]: [f64; 5]) -> f64 {
 }
 
 impl CameraModel for RadialTangential {
-    const PROJECTION: &'static str = "projection_radial_tangential";
     const EXAMPLE: &'static str = "{ fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480, \
                                    distortion = [0.1, 0.02, 0.0, 0.0, 0.0] }";
 
     #[inline(always)]
     fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
-        let [x, y] = self.bent([point.x / point.z, point.y / point.z]);
+        let [x, y] = self.distort([point.x / point.z, point.y / point.z]);
         self.pinhole.project(&Vector3::new(x, y, T::from(1.0)))
     }
 
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
         let seen = self.pinhole.ray(*pixel);
         let mut point = [seen.x, seen.y];
-        for _ in 0..STEPS {
-            let [x, y] = self.bent(point);
+        for _ in 0..MAX_ITERATIONS {
+            let [x, y] = self.distort(point);
             let off = [seen.x - x, seen.y - y];
             point = [point[0] + off[0], point[1] + off[1]];
-            if off[0].hypot(off[1]) < NEAR {
+            if off[0].hypot(off[1]) < UNPROJECT_TOLERANCE {
                 let direction = Vector3::new(point[0], point[1], 1.0);
                 return self.sees(&direction).then_some(direction);
             }
@@ -134,8 +133,8 @@ impl CameraModel for RadialTangential {
 register_camera!("radial_tangential", "projection_radial_tangential", RadialTangential);
 
 impl TryFrom<Document> for RadialTangential {
-    type Error = NotACamera;
-    fn try_from(document: Document) -> Result<Self, NotACamera> {
+    type Error = CameraError;
+    fn try_from(document: Document) -> Result<Self, CameraError> {
         let Document { fx, fy, cx, cy, width, height, distortion } = document;
         Ok(Self::new(Camera::new([fx, fy, cx, cy], width, height)?, distortion.vector().into()))
     }
@@ -164,12 +163,12 @@ mod tests {
     }
 
     /// Points that the camera sees inside its image or slightly outside.
-    fn seen() -> impl Strategy<Value = Vector3<f64>> {
+    fn any_visible_point() -> impl Strategy<Value = Vector3<f64>> {
         ([-0.65..0.65f64, -0.5..0.5], 0.5..10.0f64).prop_map(|([x, y], z)| Vector3::new(x, y, 1.0) * z)
     }
 
     jacobian_laws! {
-        jacobians_agree: (seen(), vector::<2>(500.0), any_se3()).prop_map(|(point, pixel, pose)| {
+        jacobians_agree: (any_visible_point(), vector::<2>(500.0), any_se3()).prop_map(|(point, pixel, pose)| {
             let factor = Projection { pixel: Coordinates::new(pixel).unwrap(), camera: freiburg1() };
             (factor, pose, Point3::new(pose.act(&point)))
         })
@@ -177,7 +176,7 @@ mod tests {
 
     #[test]
     fn a_pixel_is_that_of_its_direction() {
-        proptest!(|(point in seen())| prop_assert_eq!(camera_law(&freiburg1(), &point), Ok(())));
+        proptest!(|(point in any_visible_point())| prop_assert_eq!(camera_law(&freiburg1(), &point), Ok(())));
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! Position of a point in the frame of a pose: r = Rᵀ(p - t) - z.
-use crate::groups::quarter;
+use crate::groups::quarter_turn;
 use crate::{Coordinates, Point2, Point3, Se2, Se3};
 use manifactor_graph::prelude::*;
 
@@ -37,7 +37,7 @@ impl Residual for Landmark<2> {
     ) -> Vector2<f64> {
         let seen = x.inverse_act(p);
         j.0.fixed_columns_mut::<2>(0).copy_from(&-Matrix2::identity());
-        j.0.set_column(2, &-quarter(&seen));
+        j.0.set_column(2, &-quarter_turn(&seen));
         j.1 = x.rotation.matrix().transpose();
         seen - *self.position
     }

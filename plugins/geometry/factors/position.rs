@@ -1,5 +1,5 @@
 //! Position of a pose, as GPS or a total station measures it: r = R l + t - z.
-use crate::groups::quarter;
+use crate::groups::quarter_turn;
 use crate::{Coordinates, Se2, Se3};
 use manifactor_graph::prelude::*;
 
@@ -45,7 +45,7 @@ impl Residual for Position<2> {
     ) -> Vector2<f64> {
         let r = x.rotation.matrix();
         j.0.fixed_columns_mut::<2>(0).copy_from(&r);
-        j.0.set_column(2, &(r * quarter(&self.lever_arm)));
+        j.0.set_column(2, &(r * quarter_turn(&self.lever_arm)));
         self.residual((*x,))
     }
 }

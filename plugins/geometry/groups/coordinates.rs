@@ -14,7 +14,7 @@ pub struct Coordinates<const N: usize>(SVector<f64, N>);
 /// An invalid vector of coordinates.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum NoCoordinates {
+pub enum CoordinatesError {
     /// The number of entries is wrong.
     #[error("expected {expected} numbers, got {found}")]
     Count {
@@ -38,9 +38,9 @@ impl<const N: usize> Coordinates<N> {
     ///
     /// # Errors
     /// If an entry is not finite.
-    pub fn new(vector: SVector<f64, N>) -> Result<Self, NoCoordinates> {
+    pub fn new(vector: SVector<f64, N>) -> Result<Self, CoordinatesError> {
         match vector.iter().position(|x| !x.is_finite()) {
-            Some(position) => Err(NoCoordinates::NotFinite { position, value: vector[position] }),
+            Some(position) => Err(CoordinatesError::NotFinite { position, value: vector[position] }),
             None => Ok(Self(vector)),
         }
     }
@@ -76,10 +76,10 @@ impl<const N: usize> Lift for Coordinates<N> {
 }
 
 impl<const N: usize> TryFrom<Vec<f64>> for Coordinates<N> {
-    type Error = NoCoordinates;
-    fn try_from(numbers: Vec<f64>) -> Result<Self, NoCoordinates> {
+    type Error = CoordinatesError;
+    fn try_from(numbers: Vec<f64>) -> Result<Self, CoordinatesError> {
         if numbers.len() != N {
-            return Err(NoCoordinates::Count { expected: N, found: numbers.len() });
+            return Err(CoordinatesError::Count { expected: N, found: numbers.len() });
         }
         Self::new(SVector::from_column_slice(&numbers))
     }
@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn count_and_finiteness_are_checked() {
         let read = |numbers: &[f64]| Coordinates::<2>::try_from(numbers.to_vec());
-        assert_eq!(read(&[1.0]), Err(NoCoordinates::Count { expected: 2, found: 1 }));
+        assert_eq!(read(&[1.0]), Err(CoordinatesError::Count { expected: 2, found: 1 }));
         let nan = read(&[1.0, f64::INFINITY]).unwrap_err();
         assert_eq!(nan.to_string(), "expected finite numbers, got inf at position 1");
         assert_eq!(*read(&[1.0, 2.0]).unwrap(), nalgebra::Vector2::new(1.0, 2.0));

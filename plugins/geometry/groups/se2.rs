@@ -38,7 +38,7 @@ struct Document {
 }
 
 /// Returns v, rotated by a quarter turn counter-clockwise.
-pub(crate) fn quarter<T: Scalar>(v: &Vector2<T>) -> Vector2<T> {
+pub(crate) fn quarter_turn<T: Scalar>(v: &Vector2<T>) -> Vector2<T> {
     Vector2::new(-v.y, v.x)
 }
 
@@ -53,13 +53,13 @@ impl<T: Scalar> Se2<T> {
     }
     /// Returns the pose after moving by v and turning by θ at constant speed in the local frame: ξ = (v, θ).
     pub fn exp(xi: &Vector3<T>) -> Self {
-        Self::new(So2::exp(xi.z), Self::way(xi))
+        Self::new(So2::exp(xi.z), Self::exp_translation(xi))
     }
     /// Translation of Exp(v, θ): V v with V = sin θ/θ + (1 - cos θ)/θ · quarter turn.
-    fn way(xi: &Vector3<T>) -> Vector2<T> {
+    fn exp_translation(xi: &Vector3<T>) -> Vector2<T> {
         let (v, theta) = (xi.xy(), xi.z);
         let e = small_angle::exponential(theta * theta);
-        v * (e.sin_half * e.cos_half * 2.0) + quarter(&v) * (e.a * theta)
+        v * (e.sin_half * e.cos_half * 2.0) + quarter_turn(&v) * (e.a * theta)
     }
     /// Returns ξ = (v, θ), the inverse of [`Se2::exp`].
     pub fn log(&self) -> Vector3<T> {
@@ -69,7 +69,7 @@ impl<T: Scalar> Se2<T> {
         // Avoids a zero denominator: sin θ is zero at half a turn, 1 - cos θ at θ = 0.
         let cot = || if c > T::zero() { (c + 1.0) / s } else { s / (T::one() - c) };
         let half_cot = T::one() - theta2 * small_angle::k(theta2, || half * cot());
-        let v = self.translation * half_cot - quarter(&self.translation) * half;
+        let v = self.translation * half_cot - quarter_turn(&self.translation) * half;
         Vector3::new(v.x, v.y, theta)
     }
     /// Returns self · other.
@@ -107,7 +107,7 @@ impl Se2 {
     pub fn adjoint(&self) -> Matrix3<f64> {
         let mut m = Matrix3::identity();
         m.fixed_view_mut::<2, 2>(0, 0).copy_from(&self.rotation.matrix());
-        m.fixed_view_mut::<2, 1>(0, 2).copy_from(&-quarter(&self.translation));
+        m.fixed_view_mut::<2, 1>(0, 2).copy_from(&-quarter_turn(&self.translation));
         m
     }
     /// Returns Jᵣ⁻¹(ξ), with Log(Exp(ξ)·Exp(δ)) ≈ ξ + Jᵣ⁻¹(ξ)δ.
@@ -117,8 +117,8 @@ impl Se2 {
         let half_cot = 1.0 - theta * theta * k;
         let half_cot_slope = -2.0 * theta * k - theta.powi(3) * slope;
         // Derivative of v = V⁻¹t with respect to θ: (V⁻¹)' t, with t = Vv.
-        let t = Se2::way(xi);
-        let d = t * half_cot_slope - quarter(&t) * 0.5;
+        let t = Se2::exp_translation(xi);
+        let d = t * half_cot_slope - quarter_turn(&t) * 0.5;
         Matrix3::new(half_cot, -half, d.x, half, half_cot, d.y, 0.0, 0.0, 1.0)
     }
 }
@@ -155,7 +155,7 @@ impl Manifold for Se2 {
     }
     fn retract(&self, delta: &Vector3<f64>) -> Self {
         // The cosine is recomputed from the summed angle, so rounding does not accumulate.
-        Se2::new(So2::exp(self.rotation.angle() + delta.z), self.act(&Se2::way(delta)))
+        Se2::new(So2::exp(self.rotation.angle() + delta.z), self.act(&Se2::exp_translation(delta)))
     }
     fn local(&self, other: &Self) -> Vector3<f64> {
         self.between(other).log()

@@ -38,12 +38,12 @@ struct Document {
     rotation: Xyzw,
 }
 
-fn halves<T: Scalar>(xi: &Vector6<T>) -> (Vector3<T>, Vector3<T>) {
+fn split_tangent<T: Scalar>(xi: &Vector6<T>) -> (Vector3<T>, Vector3<T>) {
     (Vector3::new(xi[0], xi[1], xi[2]), Vector3::new(xi[3], xi[4], xi[5]))
 }
 
 /// Returns the block matrix [a 0; b c].
-fn lower(a: &Matrix3<f64>, b: &Matrix3<f64>, c: &Matrix3<f64>) -> Matrix6<f64> {
+fn block_lower(a: &Matrix3<f64>, b: &Matrix3<f64>, c: &Matrix3<f64>) -> Matrix6<f64> {
     let mut m = Matrix6::zeros();
     m.fixed_view_mut::<3, 3>(0, 0).copy_from(a);
     m.fixed_view_mut::<3, 3>(3, 0).copy_from(b);
@@ -62,7 +62,7 @@ impl<T: Scalar> Se3<T> {
     }
     /// Returns the pose after turning by ω and moving by v at constant speed in the local frame: ξ = (ω, v).
     pub fn exp(xi: &Vector6<T>) -> Self {
-        let (w, v) = halves(xi);
+        let (w, v) = split_tangent(xi);
         let e = small_angle::exponential(w.norm_squared());
         let wv = w.cross(&v);
         Self::new(So3::exp(&w), v + wv * e.a + w.cross(&wv) * e.b)
@@ -108,17 +108,17 @@ impl Se3 {
     /// Returns the adjoint Ad(x), with x·Exp(δ)·x⁻¹ = Exp(Ad(x)δ).
     pub fn adjoint(&self) -> Matrix6<f64> {
         let r = self.rotation.matrix();
-        lower(&r, &(self.translation.cross_matrix() * r), &r)
+        block_lower(&r, &(self.translation.cross_matrix() * r), &r)
     }
     /// Returns Jᵣ⁻¹(ξ), with Log(Exp(ξ)·Exp(δ)) ≈ ξ + Jᵣ⁻¹(ξ)δ.
     pub fn inverse_right_jacobian(xi: &Vector6<f64>) -> Matrix6<f64> {
-        let (w, v) = halves(xi);
+        let (w, v) = split_tangent(xi);
         let (wx, vx) = (w.cross_matrix(), v.cross_matrix());
         let (k, slope) = small_angle::k_and_slope(w.norm_squared());
         let r = Matrix3::identity() + wx * 0.5 + wx * wx * k;
         // Derivative of r(ω) in the direction v.
         let q = vx * 0.5 + (wx * vx + vx * wx) * k + wx * wx * (slope * w.dot(&v));
-        lower(&r, &q, &r)
+        block_lower(&r, &q, &r)
     }
     /// Returns x·Exp(δ) with its derivative with respect to δ at δ = 0, in the slots `first..first + 6` of
     /// jets with `dim` slots. For manifolds that contain a pose.
@@ -193,7 +193,7 @@ impl LieGroup for Se3 {
     }
     fn adjoint_of_inverse(x: &Se3) -> Matrix6<f64> {
         let r = x.rotation.matrix().transpose();
-        lower(&r, &(-r * x.translation.cross_matrix()), &r)
+        block_lower(&r, &(-r * x.translation.cross_matrix()), &r)
     }
 }
 
@@ -223,7 +223,7 @@ mod tests {
 
         #[test]
         fn exp_is_the_matrix_exponential(xi in se3_tangent()) {
-            let (w, v) = halves(&xi);
+            let (w, v) = split_tangent(&xi);
             let mut m = Matrix4::zeros();
             m.fixed_view_mut::<3, 3>(0, 0).copy_from(&w.cross_matrix());
             m.fixed_view_mut::<3, 1>(0, 3).copy_from(&v);

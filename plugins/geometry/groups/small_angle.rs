@@ -6,7 +6,7 @@ use manifactor_graph::Scalar;
 
 /// Threshold on θ² below which the series is used: the closed forms lose digits to cancellation there, and
 /// five terms of the series omit less than 1e-16.
-const SMALL: f64 = 1e-2;
+const SERIES_LIMIT: f64 = 1e-2;
 
 /// Evaluates c₀ + c₁x + c₂x² + ….
 fn series<T: Scalar>(x: T, c: [f64; 5]) -> T {
@@ -26,7 +26,7 @@ pub(crate) struct Exponential<T> {
 }
 
 pub(crate) fn exponential<T: Scalar>(theta2: T) -> Exponential<T> {
-    let (cos_half, sin_half, b) = if theta2 < T::from(SMALL) {
+    let (cos_half, sin_half, b) = if theta2 < T::from(SERIES_LIMIT) {
         (
             series(theta2, [1.0, -1.0 / 8.0, 1.0 / 384.0, -1.0 / 46080.0, 1.0 / 10321920.0]),
             series(theta2, [0.5, -1.0 / 48.0, 1.0 / 3840.0, -1.0 / 645120.0, 1.0 / 185794560.0]),
@@ -43,7 +43,7 @@ pub(crate) fn exponential<T: Scalar>(theta2: T) -> Exponential<T> {
 /// Returns k = (1 - (θ/2) cot(θ/2)) / θ² for the logarithmic maps. `half_cot` computes (θ/2) cot(θ/2) and is
 /// called only away from zero.
 pub(crate) fn k<T: Scalar>(theta2: T, half_cot: impl FnOnce() -> T) -> T {
-    if theta2 < T::from(SMALL) {
+    if theta2 < T::from(SERIES_LIMIT) {
         series(theta2, [1.0 / 12.0, 1.0 / 720.0, 1.0 / 30240.0, 1.0 / 1209600.0, 1.0 / 47900160.0])
     } else {
         (T::one() - half_cot()) / theta2
@@ -52,7 +52,7 @@ pub(crate) fn k<T: Scalar>(theta2: T, half_cot: impl FnOnce() -> T) -> T {
 
 /// Returns k and k'(θ) / θ for the inverse right Jacobians.
 pub(crate) fn k_and_slope(theta2: f64) -> (f64, f64) {
-    if theta2 < SMALL {
+    if theta2 < SERIES_LIMIT {
         let slope = [1.0 / 360.0, 1.0 / 7560.0, 1.0 / 201600.0, 1.0 / 5987520.0, 691.0 / 130767436800.0];
         return (k(theta2, || 0.0), series(theta2, slope));
     }
@@ -69,7 +69,7 @@ mod tests {
     #[test]
     fn series_and_closed_forms_meet() {
         // At both sides of the switch, up to the change of the function itself.
-        let (below, above) = (SMALL * (1.0 - 1e-12), SMALL * (1.0 + 1e-12));
+        let (below, above) = (SERIES_LIMIT * (1.0 - 1e-12), SERIES_LIMIT * (1.0 + 1e-12));
         let (x, y) = (exponential(below), exponential(above));
         for (x, y) in [(x.cos_half, y.cos_half), (x.sin_half, y.sin_half), (x.a, y.a), (x.b, y.b)] {
             assert!((x - y).abs() < 1e-13, "{x} {y}");

@@ -40,7 +40,7 @@ pub(crate) struct Angle(pub(crate) So2);
 /// An angle that is infinite or not a number.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected a finite angle in radians, got {0}")]
-pub struct NotAnAngle(pub f64);
+pub struct AngleError(pub f64);
 
 /// Number of turns above which subtracting turns · 2π loses digits of the angle.
 const MANY_TURNS: f64 = 1000.0;
@@ -201,9 +201,9 @@ impl LieGroup for So2 {
 }
 
 impl TryFrom<f64> for Angle {
-    type Error = NotAnAngle;
-    fn try_from(angle: f64) -> Result<Self, NotAnAngle> {
-        if angle.is_finite() { Ok(Self(So2::exp(angle))) } else { Err(NotAnAngle(angle)) }
+    type Error = AngleError;
+    fn try_from(angle: f64) -> Result<Self, AngleError> {
+        if angle.is_finite() { Ok(Self(So2::exp(angle))) } else { Err(AngleError(angle)) }
     }
 }
 impl From<Angle> for f64 {
@@ -283,7 +283,7 @@ mod tests {
 
     #[test]
     fn an_angle_that_is_none_is_refused() {
-        assert!(matches!(Angle::try_from(f64::NAN), Err(NotAnAngle(_))));
+        assert!(matches!(Angle::try_from(f64::NAN), Err(AngleError(_))));
         assert!(serde_json::from_str::<So2>(r#"{ "angle": "north" }"#).is_err());
         assert_eq!(serde_json::from_str::<So2>(r#"{ "angle": 7.0 }"#).unwrap(), So2::exp(7.0));
     }

@@ -41,7 +41,7 @@ pub(crate) struct Xyzw(pub(crate) So3);
 #[error(
     "expected a unit quaternion (x, y, z, w), got {xyzw:?} of length {length}; its length has to be 1 to within 0.001"
 )]
-pub struct NotARotation {
+pub struct RotationError {
     /// The quaternion given.
     pub xyzw: [f64; 4],
     /// Its length.
@@ -120,11 +120,11 @@ impl So3 {
     ///
     /// # Errors
     /// If the length differs from 1 by more than 0.001. A smaller difference is removed by normalization.
-    pub fn from_quaternion_xyzw(xyzw: [f64; 4]) -> Result<Self, NotARotation> {
+    pub fn from_quaternion_xyzw(xyzw: [f64; 4]) -> Result<Self, RotationError> {
         let q = Quaternion::from(Vector4::from(xyzw));
         let length = q.norm();
         // This form also rejects NaN.
-        if (length - 1.0).abs() <= 1e-3 { Ok(renormalized(q)) } else { Err(NotARotation { xyzw, length }) }
+        if (length - 1.0).abs() <= 1e-3 { Ok(renormalized(q)) } else { Err(RotationError { xyzw, length }) }
     }
     /// Returns the unit quaternion as x, y, z, w.
     pub fn quaternion_xyzw(&self) -> [f64; 4] {
@@ -234,8 +234,8 @@ impl LieGroup for So3 {
 }
 
 impl TryFrom<[f64; 4]> for Xyzw {
-    type Error = NotARotation;
-    fn try_from(xyzw: [f64; 4]) -> Result<Self, NotARotation> {
+    type Error = RotationError;
+    fn try_from(xyzw: [f64; 4]) -> Result<Self, RotationError> {
         So3::from_quaternion_xyzw(xyzw).map(Self)
     }
 }

@@ -12,7 +12,7 @@ use super::loops::is_wound;
 use super::network::{Edge, Information, Network};
 use super::pose::Pose;
 use super::relaxation::{Relaxation, Term};
-use super::start::reseat;
+use super::start::place_points;
 use super::{Tree, spanning_tree};
 use crate::{Between, Prior, Se2, Se3, So2, So3};
 use manifactor_graph::{Factor, Graph, ValueError, Values, Variable, register};
@@ -60,7 +60,7 @@ impl Start for Chordal {
 register!(dyn Start, "chordal", Chordal);
 
 fn relax_all(graph: &Graph, values: &Values) -> Result<Values, StartError> {
-    let mut found = Found::default();
+    let mut found = NewValues::default();
     found.resize_with(values.len(), || None);
     let applies = [
         relax::<So2, 2>(graph, values, &mut found)?,
@@ -76,18 +76,18 @@ fn relax_all(graph: &Graph, values: &Values) -> Result<Values, StartError> {
     for ((key, value), found) in values.iter().zip(found) {
         started.insert_boxed(key.clone(), found.unwrap_or_else(|| value.erased().clone_box()));
     }
-    reseat(graph, &mut started);
+    place_points(graph, &mut started);
     Ok(started)
 }
 
 /// New values, by index among the values.
-type Found = Vec<Option<Box<dyn Variable>>>;
+type NewValues = Vec<Option<Box<dyn Variable>>>;
 
 /// Computes the poses of one type from the measurements between them; false if there is none.
 fn relax<P: Pose<D>, const D: usize>(
     graph: &Graph,
     values: &Values,
-    found: &mut Found,
+    found: &mut NewValues,
 ) -> Result<bool, StartError>
 where
     Between<P>: Factor,
@@ -106,7 +106,7 @@ where
     let mut relaxation = Relaxation::new(&net.edges, anchored)?;
     let rotations = rotations(&net, &mut relaxation).map_err(failed("rotations"))?;
     let mut translations: Vec<_> = net.poses.iter().map(Pose::translation).collect();
-    if P::MOVE.is_some() {
+    if P::FIRST_TRANSLATION.is_some() {
         let anchored = net.anchored(|e| e.information.shift.iter().any(|x| *x != 0.0));
         if !relaxation.fits(&anchored) {
             relaxation = Relaxation::new(&net.edges, anchored)?;

@@ -1,6 +1,6 @@
 //! Poses of one type and the relative measurements between them, in the form that linear methods need.
 use super::as_factor;
-use super::parts::Parts;
+use super::parts::ConnectedSets;
 use super::pose::Pose;
 use crate::{Between, Prior};
 use manifactor_graph::{Factor, Fixed, Graph, Key, Values};
@@ -41,10 +41,10 @@ pub(crate) struct Information<const D: usize> {
 impl<const D: usize> Information<D> {
     fn of<P: Pose<D>>(m: &DMatrix<f64>) -> Self {
         let entry = |r: Option<usize>, c: Option<usize>| r.zip(c).map_or(0.0, |at| m[at]);
-        let shift = |k: usize| P::MOVE.map(|first| first + k);
+        let shift = |k: usize| P::FIRST_TRANSLATION.map(|first| first + k);
         Self {
-            turn: Matrix3::from_fn(|r, c| entry(P::TURN[r], P::TURN[c])),
-            cross: SMatrix::from_fn(|r, c| entry(shift(r), P::TURN[c])),
+            turn: Matrix3::from_fn(|r, c| entry(P::ROTATION_DIRECTIONS[r], P::ROTATION_DIRECTIONS[c])),
+            cross: SMatrix::from_fn(|r, c| entry(shift(r), P::ROTATION_DIRECTIONS[c])),
             shift: SMatrix::from_fn(|r, c| entry(shift(r), shift(c))),
         }
     }
@@ -160,7 +160,7 @@ where
     /// of each connected part without a held one.
     pub(crate) fn anchored(&self, counts: impl Fn(&Edge<D>) -> bool) -> Vec<bool> {
         let n = self.poses.len();
-        let mut parts = Parts::new(n);
+        let mut parts = ConnectedSets::new(n);
         self.edges.iter().filter(|e| counts(e)).for_each(|e| parts.join(e.a, e.b));
         let mut part_is_held = vec![false; n];
         (0..n).filter(|i| self.held[*i]).for_each(|i| part_is_held[parts.root(i)] = true);

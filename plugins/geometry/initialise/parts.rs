@@ -1,9 +1,9 @@
 //! Disjoint sets of numbers, to find the connected parts of a graph.
 
 /// Parent of each member; the root of a set is its smallest member.
-pub(crate) struct Parts(Vec<usize>);
+pub(crate) struct ConnectedSets(Vec<usize>);
 
-impl Parts {
+impl ConnectedSets {
     /// Creates sets of the numbers below `n`, each with one member.
     pub(crate) fn new(n: usize) -> Self {
         Self((0..n).collect())
@@ -30,7 +30,7 @@ mod tests {
 
     #[test]
     fn joined_numbers_have_the_smallest_as_their_root() {
-        let mut parts = Parts::new(6);
+        let mut parts = ConnectedSets::new(6);
         for (a, b) in [(5, 4), (1, 3), (4, 3)] {
             parts.join(a, b);
         }

@@ -7,9 +7,9 @@ use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
 /// A rotation of `D` dimensions, with or without a position.
 pub(crate) trait Pose<const D: usize>: LieGroup + Variable + Copy {
     /// Index of the tangent direction that turns about x, y and z, if there is one.
-    const TURN: [Option<usize>; 3];
+    const ROTATION_DIRECTIONS: [Option<usize>; 3];
     /// First of the translational tangent directions; `None` for rotations.
-    const MOVE: Option<usize>;
+    const FIRST_TRANSLATION: Option<usize>;
     fn rotation(&self) -> SMatrix<f64, D, D>;
     fn translation(&self) -> SVector<f64, D>;
     /// Creates the pose from an exact rotation.
@@ -47,8 +47,8 @@ fn log_in_space(r: &Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
 }
 
 impl Pose<2> for So2 {
-    const TURN: [Option<usize>; 3] = [None, None, Some(0)];
-    const MOVE: Option<usize> = None;
+    const ROTATION_DIRECTIONS: [Option<usize>; 3] = [None, None, Some(0)];
+    const FIRST_TRANSLATION: Option<usize> = None;
     fn rotation(&self) -> Matrix2<f64> {
         self.matrix()
     }
@@ -67,8 +67,8 @@ impl Pose<2> for So2 {
 }
 
 impl Pose<2> for Se2 {
-    const TURN: [Option<usize>; 3] = [None, None, Some(2)];
-    const MOVE: Option<usize> = Some(0);
+    const ROTATION_DIRECTIONS: [Option<usize>; 3] = [None, None, Some(2)];
+    const FIRST_TRANSLATION: Option<usize> = Some(0);
     fn rotation(&self) -> Matrix2<f64> {
         self.rotation.matrix()
     }
@@ -87,8 +87,8 @@ impl Pose<2> for Se2 {
 }
 
 impl Pose<3> for So3 {
-    const TURN: [Option<usize>; 3] = [Some(0), Some(1), Some(2)];
-    const MOVE: Option<usize> = None;
+    const ROTATION_DIRECTIONS: [Option<usize>; 3] = [Some(0), Some(1), Some(2)];
+    const FIRST_TRANSLATION: Option<usize> = None;
     fn rotation(&self) -> Matrix3<f64> {
         self.matrix()
     }
@@ -107,8 +107,8 @@ impl Pose<3> for So3 {
 }
 
 impl Pose<3> for Se3 {
-    const TURN: [Option<usize>; 3] = [Some(0), Some(1), Some(2)];
-    const MOVE: Option<usize> = Some(3);
+    const ROTATION_DIRECTIONS: [Option<usize>; 3] = [Some(0), Some(1), Some(2)];
+    const FIRST_TRANSLATION: Option<usize> = Some(3);
     fn rotation(&self) -> Matrix3<f64> {
         self.rotation.matrix()
     }

@@ -11,7 +11,7 @@ pub(crate) struct Term<const D: usize, const C: usize> {
 }
 
 /// Smallest share of its diagonal that a pivot may have; smaller pivots are rounding.
-const SINGULAR: f64 = 1e-14;
+const MIN_RELATIVE_PIVOT: f64 = 1e-14;
 
 /// Structure of a sum of cost terms: one block per free node.
 pub(crate) struct Relaxation<const D: usize> {
@@ -82,7 +82,7 @@ impl<const D: usize> Relaxation<D> {
         }
         if n > 0 {
             self.system.factorize()?;
-            if self.system.smallest_pivot() < SINGULAR {
+            if self.system.smallest_pivot() < MIN_RELATIVE_PIVOT {
                 return Err(BlockSystemError::NotPositiveDefinite);
             }
             right.chunks_exact_mut(n).for_each(|column| self.system.solve(column));

@@ -1,5 +1,5 @@
 //! Spanning trees as a named start for solvers.
-use super::parts::Parts;
+use super::parts::ConnectedSets;
 use super::{Tree, as_factor, seen_point, spanning_tree};
 use crate::{Between, Point1, Point2, Point3, Prior, Se2, Se3, So2, So3};
 use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Values, register};
@@ -34,14 +34,14 @@ impl Start for SpanningTree {
         for (key, value) in grown.iter() {
             started.insert_boxed(key.clone(), value.erased().clone_box());
         }
-        reseat(graph, &mut started);
+        place_points(graph, &mut started);
         Ok(started)
     }
 }
 register!(dyn Start, "spanning_tree", SpanningTree);
 
 /// Moves free points to their first measured position, unless a prior or between factor places them.
-pub(crate) fn reseat(graph: &Graph, values: &mut Values) {
+pub(crate) fn place_points(graph: &Graph, values: &mut Values) {
     let seen: Vec<_> = graph.factors().iter().filter_map(|entry| seen_point(entry, values)).collect();
     if seen.is_empty() {
         return;
@@ -77,7 +77,7 @@ of_any_type!(prior, Prior, 1, Se3, Se2, So3, So2, Point3, Point2, Point1);
 /// Returns the values from which variables are placed: the held ones, and the first of each part without a
 /// held variable or prior. `None` if there is no between factor.
 fn roots(graph: &Graph, values: &Values) -> Option<Values> {
-    let mut parts = Parts::new(values.len());
+    let mut parts = ConnectedSets::new(values.len());
     let mut found = false;
     let place = |key: &Key| values.position(key.as_str());
     for [a, b] in graph.factors().iter().filter_map(joined) {

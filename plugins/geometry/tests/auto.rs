@@ -14,9 +14,9 @@ use std::ops::ControlFlow;
 
 thread_local! {
     /// Number of calls to starts.
-    static ASKED: Cell<usize> = const { Cell::new(0) };
+    static START_CALLS: Cell<usize> = const { Cell::new(0) };
     /// Values that the test's start returns. If set, it doubts every minimum.
-    static RIVAL: RefCell<Option<Values>> = const { RefCell::new(None) };
+    static RIVAL_VALUES: RefCell<Option<Values>> = const { RefCell::new(None) };
 }
 
 /// A start that does nothing unless a test sets its values.
@@ -30,12 +30,12 @@ struct Rival {}
 #[typetag::serialize(name = "test_rival")]
 impl Start for Rival {
     fn start(&self, _: &Graph, _: &Values) -> Result<Values, StartError> {
-        ASKED.set(ASKED.get() + 1);
+        START_CALLS.set(START_CALLS.get() + 1);
         let none = StartError::NotApplicable { start: "test_rival", needs: "a test" };
-        RIVAL.with_borrow(|rival| rival.clone().ok_or(none))
+        RIVAL_VALUES.with_borrow(|rival| rival.clone().ok_or(none))
     }
     fn doubts(&self, _: &Graph, _: &Values) -> bool {
-        RIVAL.with_borrow(|rival| rival.is_some())
+        RIVAL_VALUES.with_borrow(|rival| rival.is_some())
     }
 }
 register!(dyn Start, "test_rival", Rival);
@@ -129,10 +129,10 @@ fn scaled(graph: &Graph, times: f64) -> Graph {
 
 /// Solves and returns the outcome and the number of calls to starts.
 fn ran(solver: &dyn Optimizer, graph: &Graph, values: &Values) -> (Outcome, usize) {
-    ASKED.set(0);
+    START_CALLS.set(0);
     let outcome = solve(graph, values, solver, &mut Silent).unwrap().outcome;
     assert!(outcome.termination.is_converged(), "{}", outcome.termination);
-    (outcome, ASKED.get())
+    (outcome, START_CALLS.get())
 }
 
 #[test]
@@ -190,9 +190,9 @@ fn a_rival_is_dropped_once_it_has_cost_more_than_the_minimum() {
         let far = Vector6::from_fn(|r, _| 3.0 * ((i * (r + 2)) as f64).sin());
         rival.insert(key.clone(), Se3::exp(&far));
     }
-    RIVAL.set(Some(rival));
+    RIVAL_VALUES.set(Some(rival));
     let (own, asked) = ran(&Auto { stop, ..Auto::default() }, &graph, &values);
-    RIVAL.set(None);
+    RIVAL_VALUES.set(None);
     assert_eq!(asked, 1);
     assert!((own.final_cost - plain.final_cost).abs() < 1e-9 * plain.final_cost);
     assert!(own.iterations <= 2 * plain.iterations, "{} of {}", own.iterations, plain.iterations);

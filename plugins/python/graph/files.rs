@@ -3,7 +3,7 @@ use super::{Graph, Values};
 use crate::errors;
 use crate::threads::detach;
 use manifactor::config::{Document, Format, read_graph, write_graph};
-use manifactor::formats::{FormatError, GraphFormat, Reading, Repair, read_text};
+use manifactor::formats::{FormatError, GraphFormat, InformationRepair, ReadOptions, read_text};
 use manifactor::graph::{Graph as InnerGraph, Values as InnerValues};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
@@ -46,9 +46,9 @@ fn read(
     lenient: bool,
 ) -> PyResult<(Graph, Values, Vec<String>)> {
     let repair = match repair {
-        "error" => Repair::Error,
-        "reject" => Repair::Reject,
-        "clamp" => Repair::Clamp,
+        "error" => InformationRepair::Error,
+        "reject" => InformationRepair::Reject,
+        "clamp" => InformationRepair::Clamp,
         other => {
             let message = format!("expected \"error\", \"reject\" or \"clamp\", got {other:?}");
             return Err(errors::argument("load", "repair", message));
@@ -61,8 +61,8 @@ fn read(
     }
     let read = detach(py, || {
         let text = read_text(&path)?;
-        let format = GraphFormat::of(&path, &text);
-        format.map(|format| (format.parse)(&text, &path, Reading { repair, anchor, lenient })).transpose()
+        let format = GraphFormat::detect(&path, &text);
+        format.map(|format| (format.parse)(&text, &path, ReadOptions { repair, anchor, lenient })).transpose()
     })?;
     match read.map_err(unreadable)? {
         Some(read) => Ok((Graph(read.graph.into()), Values(read.values.into()), read.notes)),

@@ -9,7 +9,7 @@ use manifactor_graph::prelude::*;
 use nalgebra::{Matrix4x6, SMatrix};
 
 /// Minimum visible extent of a cut object, in pixels: no detector draws a smaller box.
-const VISIBLE: f64 = 1.0;
+const MIN_VISIBLE_PX: f64 = 1.0;
 
 /// A detector measures the box around an object's outline: r = β(x, q) - b, in pixels.
 ///
@@ -81,13 +81,13 @@ impl BoundingBoxFactor {
         let sides = outline.truncated_sides(self.camera.size())?;
         let [xmin, ymin, xmax, ymax] = sides.map(|s| s.bound());
         let [width, height] = [outline.xx, outline.yy].map(|s| s.sqrt() * 2.0);
-        let left = |extent: T, all: T| extent >= T::from(VISIBLE) || extent >= all * 0.5;
+        let left = |extent: T, all: T| extent >= T::from(MIN_VISIBLE_PX) || extent >= all * 0.5;
         (left(xmax - xmin, width) && left(ymax - ymin, height)).then_some(sides)
     }
 
     /// Returns the predicted box of the object in the camera's image; `None` if the factor is not defined.
     pub fn predict(&self, world_from_camera: &Se3, quadric: &DualQuadric) -> Option<BoundingBox> {
-        let sides = self.sides(&Ellipsoid::seen(world_from_camera, quadric))?;
+        let sides = self.sides(&Ellipsoid::in_camera_frame(world_from_camera, quadric))?;
         Some(BoundingBox::from_bounds(sides.map(|s| s.bound())))
     }
 
@@ -107,7 +107,7 @@ impl BoundingBoxFactor {
     ) -> Option<Vector4<f64>> {
         by_pose.fill(0.0);
         by_quadric.fill(0.0);
-        let seen = Ellipsoid::seen(camera, quadric);
+        let seen = Ellipsoid::in_camera_frame(camera, quadric);
         let sides = self.sides(&seen)?;
         for (i, side) in sides.iter().enumerate() {
             if let Some(line) = TangentLine::of(&self.camera, side, i % 2) {
@@ -127,7 +127,7 @@ impl Residual for BoundingBoxFactor {
 
     #[inline]
     fn residual<T: Scalar>(&self, (camera, quadric): Lifted<Self::Variables, T>) -> Vector4<T> {
-        let sides = self.sides(&Ellipsoid::seen(&camera, &quadric));
+        let sides = self.sides(&Ellipsoid::in_camera_frame(&camera, &quadric));
         sides.map_or_else(Vector4::zeros, |sides| self.error(&sides))
     }
 
@@ -135,7 +135,7 @@ impl Residual for BoundingBoxFactor {
     fn is_defined(&self, (camera, quadric): Refs<'_, Self::Variables>) -> bool {
         match self.model {
             BoxModel::Standard => quadric.is_in_front_of(camera),
-            BoxModel::Truncated => self.sides(&Ellipsoid::seen(camera, quadric)).is_some(),
+            BoxModel::Truncated => self.sides(&Ellipsoid::in_camera_frame(camera, quadric)).is_some(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Orientation of an object: its major axis is vertical or horizontal.
 use crate::DualQuadric;
-use crate::shapes::turned;
+use crate::shapes::move_and_scale;
 use manifactor_graph::prelude::*;
 
 /// Defines a factor of the major semi-axis m of an object and the world's up direction: its docs, name and
@@ -28,7 +28,7 @@ macro_rules! orientation {
         }
         register_factor!($name, $type, up);
         register_invariance!($type, $free, |$factor, ($quadric,), random| {
-            (turned($quadric, &$axis, random),)
+            (move_and_scale($quadric, &$axis, random),)
         });
     };
 }

@@ -39,18 +39,18 @@ register_factor!("shape_prior", ShapePrior);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{any_quadric, unequal_quadric, usual};
+    use crate::testing::{any_quadric, typical_quadric, unequal_quadric};
     use manifactor_testing::{check, invariance_law, jacobian_laws};
     use proptest::prelude::*;
 
     jacobian_laws! {
-        the_jacobian_is_right: (usual(), unequal_quadric())
+        the_jacobian_is_right: (typical_quadric(), unequal_quadric())
             .prop_map(|((semi_axes, order), q)| (ShapePrior { semi_axes, order }, q));
     }
 
     #[test]
     fn the_shape_is_free_of_the_size() {
-        check((usual(), any_quadric(), 0.1..10.0), |((semi_axes, order), quadric, size)| {
+        check((typical_quadric(), any_quadric(), 0.1..10.0), |((semi_axes, order), quadric, size)| {
             let other = DualQuadric { semi_axes: quadric.semi_axes * size, ..quadric };
             invariance_law(&ShapePrior { semi_axes, order }, &[&quadric], &[&other])
         });

@@ -45,19 +45,19 @@ register_factor!("size_prior", SizePrior);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{any_quadric, tilted, unequal_quadric, usual};
+    use crate::testing::{any_quadric, tilted, typical_quadric, unequal_quadric};
     use manifactor_graph::Factor;
     use manifactor_testing::{check, invariance_law, jacobian_laws};
     use proptest::prelude::*;
 
     jacobian_laws! {
-        the_jacobian_is_right: (usual(), unequal_quadric())
+        the_jacobian_is_right: (typical_quadric(), unequal_quadric())
             .prop_map(|((semi_axes, order), q)| (SizePrior { semi_axes, order }, q));
     }
 
     #[test]
     fn the_numbering_of_the_axes_does_not_matter_when_sorted() {
-        check((usual(), any_quadric()), |((semi_axes, _), quadric)| {
+        check((typical_quadric(), any_quadric()), |((semi_axes, _), quadric)| {
             let permuted = Vector3::new(quadric.semi_axes.z, quadric.semi_axes.x, quadric.semi_axes.y);
             let other = DualQuadric { semi_axes: permuted, ..quadric };
             invariance_law(&SizePrior { semi_axes, order: AxisOrder::Sorted }, &[&quadric], &[&other])

@@ -1,5 +1,5 @@
 //! Initial estimate from a box and the depth at its centre; one view is enough.
-use super::{InitialiseError, Initialiser, View, check_views, check_visible, shape};
+use super::{InitialiseError, Initialiser, ObjectView, check_views, check_visible, shape};
 use crate::shapes::DualQuadric;
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::register;
@@ -20,21 +20,22 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Depth {
+#[schemars(rename = "Depth")]
+pub struct DepthInitialiser {
     /// Depth of objects relative to their width and height: 1 for a ball, 0 if the measured depth belongs to
     /// the centre.
     pub thickness: NotNegative,
 }
 
-impl Default for Depth {
+impl Default for DepthInitialiser {
     fn default() -> Self {
         Self { thickness: NotNegative::literal(1.0) }
     }
 }
 
-impl Depth {
+impl DepthInitialiser {
     /// Returns the centre in the world frame.
-    fn centroid(&self, view: &View) -> Option<Vector3<f64>> {
+    fn centroid(&self, view: &ObjectView) -> Option<Vector3<f64>> {
         let depth = view.depth.filter(|depth| *depth > 0.0)?;
         let (b, camera) = (&view.bounding_box, &view.camera);
         // Half the size at depth 1. The clamp handles boxes too large for an object behind the surface.
@@ -45,8 +46,8 @@ impl Depth {
 }
 
 #[typetag::serialize(name = "depth")]
-impl Initialiser for Depth {
-    fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
+impl Initialiser for DepthInitialiser {
+    fn initialise(&self, views: &[ObjectView]) -> Result<DualQuadric, InitialiseError> {
         check_views(views, 1)?;
         let (mut sum, mut count) = (Vector3::zeros(), 0);
         for centroid in views.iter().filter_map(|view| self.centroid(view)) {
@@ -61,4 +62,4 @@ impl Initialiser for Depth {
         Ok(quadric)
     }
 }
-register!(dyn Initialiser, "depth", Depth);
+register!(dyn Initialiser, "depth", DepthInitialiser);

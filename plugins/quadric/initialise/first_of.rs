@@ -1,5 +1,5 @@
 //! Initialisers tried one after another.
-use super::{InitialiseError, Initialiser, View};
+use super::{InitialiseError, Initialiser, ObjectView};
 use crate::shapes::DualQuadric;
 use manifactor_graph::register;
 use schemars::JsonSchema;
@@ -14,15 +14,16 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct FirstOf {
+#[schemars(rename = "FirstOf")]
+pub struct FirstOfInitialiser {
     /// Initialisers to try, in this order.
     #[schemars(length(min = 1))]
     pub initialisers: Vec<Box<dyn Initialiser>>,
 }
 
 #[typetag::serialize(name = "first_of")]
-impl Initialiser for FirstOf {
-    fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
+impl Initialiser for FirstOfInitialiser {
+    fn initialise(&self, views: &[ObjectView]) -> Result<DualQuadric, InitialiseError> {
         let mut errors = vec![];
         for initialiser in &self.initialisers {
             match initialiser.initialise(views) {
@@ -33,4 +34,4 @@ impl Initialiser for FirstOf {
         Err(InitialiseError::All(errors))
     }
 }
-register!(dyn Initialiser, "first_of", FirstOf);
+register!(dyn Initialiser, "first_of", FirstOfInitialiser);

@@ -1,5 +1,5 @@
 //! Initial estimate from the intersection of lines of sight, with a size from the boxes.
-use super::{InitialiseError, Initialiser, View, check_parallax, check_views, check_visible, shape};
+use super::{InitialiseError, Initialiser, ObjectView, check_parallax, check_views, check_visible, shape};
 use crate::shapes::DualQuadric;
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::register;
@@ -19,22 +19,23 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Rays {
+#[schemars(rename = "Rays")]
+pub struct RaysInitialiser {
     /// Minimum number of views, 2 or more.
     pub min_views: usize,
     /// Minimum angle between the lines of sight of two views, in degrees.
     pub min_parallax: NotNegative,
 }
 
-impl Default for Rays {
+impl Default for RaysInitialiser {
     fn default() -> Self {
         Self { min_views: 2, min_parallax: NotNegative::literal(1.0) }
     }
 }
 
 #[typetag::serialize(name = "rays")]
-impl Initialiser for Rays {
-    fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
+impl Initialiser for RaysInitialiser {
+    fn initialise(&self, views: &[ObjectView]) -> Result<DualQuadric, InitialiseError> {
         check_views(views, self.min_views.max(2))?;
         check_parallax(views, *self.min_parallax)?;
         let quadric = shape::ellipsoid(views, shape::centroid(views)?)?;
@@ -42,4 +43,4 @@ impl Initialiser for Rays {
         Ok(quadric)
     }
 }
-register!(dyn Initialiser, "rays", Rays);
+register!(dyn Initialiser, "rays", RaysInitialiser);

@@ -1,5 +1,5 @@
 //! Position and size of an object from the planes of its boxes, each by linear least squares.
-use super::{InitialiseError, View};
+use super::{InitialiseError, ObjectView};
 use crate::shapes::DualQuadric;
 use crate::shapes::SemiAxes;
 use manifactor_geometry::{Se3, So3};
@@ -7,15 +7,15 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Weight of the pull towards a ball, relative to the planes. Views from one side do not determine the extent
 /// along the line of sight.
-const TO_A_BALL: f64 = 0.01;
+const BALL_WEIGHT: f64 = 0.01;
 /// Minimum semi-axis, relative to the mean of the three.
-const THINNEST: f64 = 0.1;
+const MIN_RELATIVE_AXIS: f64 = 0.1;
 
 /// Returns the point closest to all planes through a camera and the centre of its box: n·(x - c) = 0.
 ///
 /// Centre lines are used instead of sides, because a box that is cut on one side still has the centre line of
 /// one axis.
-pub(super) fn centroid(views: &[View]) -> Result<Vector3<f64>, InitialiseError> {
+pub(super) fn centroid(views: &[ObjectView]) -> Result<Vector3<f64>, InitialiseError> {
     let (mut h, mut g, mut planes) = (Matrix3::zeros(), Vector3::zeros(), 0);
     for view in views {
         for line in view.middle_lines() {
@@ -41,7 +41,10 @@ pub(super) fn centroid(views: &[View]) -> Result<Vector3<f64>, InitialiseError> 
 ///
 /// A plane with unit normal n at distance h touches the ellipsoid if nᵀAn = h², which is linear in A =
 /// diag(a², b², c²).
-pub(super) fn ellipsoid(views: &[View], centroid: Vector3<f64>) -> Result<DualQuadric, InitialiseError> {
+pub(super) fn ellipsoid(
+    views: &[ObjectView],
+    centroid: Vector3<f64>,
+) -> Result<DualQuadric, InitialiseError> {
     let mut planes = vec![];
     for view in views {
         let from_camera = centroid - view.world_from_camera.translation;
@@ -55,14 +58,14 @@ pub(super) fn ellipsoid(views: &[View], centroid: Vector3<f64>) -> Result<DualQu
     }
     let count = planes.len() as f64;
     let ball = planes.iter().map(|(_, h2)| h2).sum::<f64>() / count;
-    let weight = TO_A_BALL * count;
+    let weight = BALL_WEIGHT * count;
     let (mut h, mut g) = (Matrix3::from_diagonal_element(weight), Vector3::repeat(weight * ball));
     for (n2, h2) in &planes {
         h += n2 * n2.transpose();
         g += n2 * *h2;
     }
     let squares = h.cholesky().map(|h| h.solve(&g)).ok_or(InitialiseError::Undetermined)?;
-    let semi_axes = squares.map(|s| s.max(ball * THINNEST * THINNEST).sqrt());
-    let semi_axes = SemiAxes::new(semi_axes).map_err(crate::NotAnEllipsoid::from)?.vector();
+    let semi_axes = squares.map(|s| s.max(ball * MIN_RELATIVE_AXIS * MIN_RELATIVE_AXIS).sqrt());
+    let semi_axes = SemiAxes::new(semi_axes).map_err(crate::EllipsoidError::from)?.vector();
     Ok(DualQuadric { pose: Se3::new(So3::identity(), centroid), semi_axes })
 }

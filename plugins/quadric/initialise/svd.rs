@@ -1,5 +1,5 @@
 //! The dual quadric that touches the planes of all box sides, from a singular value decomposition.
-use super::{InitialiseError, Initialiser, View, check_parallax, check_views, check_visible, shape};
+use super::{InitialiseError, Initialiser, ObjectView, check_parallax, check_views, check_visible, shape};
 use crate::shapes::DualQuadric;
 use crate::shapes::OnHyperboloid;
 use manifactor_graph::checked::NotNegative;
@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Number of planes that determine the ten entries of Q* up to scale.
-const NEEDED: usize = 9;
+const MIN_PLANES: usize = 9;
 
 /// The surface that touches the planes of all box sides: πᵀQ*π = 0, linear in Q*, by SVD.
 ///
@@ -29,7 +29,8 @@ const NEEDED: usize = 9;
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Svd {
+#[schemars(rename = "Svd")]
+pub struct SvdInitialiser {
     /// Minimum number of views. 3 are sufficient if all their sides are observed.
     pub min_views: usize,
     /// Minimum angle between the lines of sight of two views, in degrees.
@@ -41,7 +42,7 @@ pub struct Svd {
     pub on_hyperboloid: OnHyperboloid,
 }
 
-impl Default for Svd {
+impl Default for SvdInitialiser {
     fn default() -> Self {
         Self {
             min_views: 3,
@@ -53,13 +54,13 @@ impl Default for Svd {
 }
 
 #[typetag::serialize(name = "svd")]
-impl Initialiser for Svd {
-    fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
+impl Initialiser for SvdInitialiser {
+    fn initialise(&self, views: &[ObjectView]) -> Result<DualQuadric, InitialiseError> {
         check_views(views, self.min_views)?;
         check_parallax(views, *self.min_parallax)?;
         let found = views.iter().map(|v| v.lines().count()).sum();
-        if found < NEEDED {
-            return Err(InitialiseError::TooFewSides { found, needed: NEEDED });
+        if found < MIN_PLANES {
+            return Err(InitialiseError::TooFewSides { found, needed: MIN_PLANES });
         }
         let matrix = if self.normalised { normalised(views)? } else { null_space(&pixel_planes(views))? };
         let quadric = DualQuadric::from_matrix_or(&matrix, self.on_hyperboloid)?;
@@ -67,10 +68,10 @@ impl Initialiser for Svd {
         Ok(quadric)
     }
 }
-register!(dyn Initialiser, "svd", Svd);
+register!(dyn Initialiser, "svd", SvdInitialiser);
 
 /// Returns the planes π = Pᵀl of all observed sides.
-fn pixel_planes(views: &[View]) -> Vec<Vector4<f64>> {
+fn pixel_planes(views: &[ObjectView]) -> Vec<Vector4<f64>> {
     let mut planes = vec![];
     for view in views {
         let projection = view.camera.projection(&view.world_from_camera);
@@ -80,7 +81,7 @@ fn pixel_planes(views: &[View]) -> Vec<Vector4<f64>> {
 }
 
 /// Computes Q* from planes with unit normals, in a frame centred at the object and scaled by its size.
-fn normalised(views: &[View]) -> Result<Matrix4<f64>, InitialiseError> {
+fn normalised(views: &[ObjectView]) -> Result<Matrix4<f64>, InitialiseError> {
     let origin = shape::centroid(views)?;
     let mut planes: Vec<Vector4<f64>> = vec![];
     for view in views {

@@ -29,7 +29,7 @@ fn arc(count: usize, radians: f64, distance: f64) -> Vec<Se3> {
 
 /// Boxes of the true object in each view, with up to `noise` pixels of error on the sides, and the depth of
 /// the surface on the line through the box centre.
-fn views(truth: &DualQuadric, poses: &[Se3], noise: f64) -> Vec<View> {
+fn views(truth: &DualQuadric, poses: &[Se3], noise: f64) -> Vec<ObjectView> {
     let blank = BoundingBoxFactor {
         bounding_box: BoundingBox::new([0.0; 4]).unwrap(),
         camera: camera(),
@@ -40,14 +40,14 @@ fn views(truth: &DualQuadric, poses: &[Se3], noise: f64) -> Vec<View> {
         for (k, bound) in bounds.iter_mut().enumerate() {
             *bound += noise * (12.9898 * (4 * i + k) as f64 + 1.0).sin();
         }
-        let view = View::new(*pose, camera(), BoundingBox::new(bounds).unwrap());
-        View { depth: surface(truth, &view), ..view }
+        let view = ObjectView::new(*pose, camera(), BoundingBox::new(bounds).unwrap());
+        ObjectView { depth: surface(truth, &view), ..view }
     };
     poses.iter().enumerate().map(one).collect()
 }
 
 /// Depth at which the line through the box centre enters the true object.
-fn surface(truth: &DualQuadric, view: &View) -> Option<f64> {
+fn surface(truth: &DualQuadric, view: &ObjectView) -> Option<f64> {
     let ray = view.camera.ray(view.bounding_box.centre());
     let local = truth.pose.between(&view.world_from_camera);
     let (o, d) = (local.translation, local.rotation.act(&ray));
@@ -76,7 +76,7 @@ fn iou(a: &DualQuadric, b: &DualQuadric) -> f64 {
 #[test]
 fn svd_finds_the_object_from_exact_boxes() {
     for normalised in [true, false] {
-        let svd = Svd { normalised, ..Svd::default() };
+        let svd = SvdInitialiser { normalised, ..SvdInitialiser::default() };
         check(any_object(), |truth| {
             let found = svd.initialise(&views(&truth, &arc(8, 4.0, 2.0), 0.0)).unwrap();
             let error = (found.matrix() - truth.matrix()).norm();
@@ -87,7 +87,7 @@ fn svd_finds_the_object_from_exact_boxes() {
 }
 
 /// Mean IoU over 40 objects at this distance from the world origin; a failed estimate counts as 0.
-fn mean_iou(svd: &Svd, distance: f64, noise: f64) -> f64 {
+fn mean_iou(svd: &SvdInitialiser, distance: f64, noise: f64) -> f64 {
     let away = Se3::new(So3::identity(), Vector3::new(1.0, -0.7, 0.2) * distance);
     let poses: Vec<_> = arc(12, 1.5, 2.0).iter().map(|p| away.compose(p)).collect();
     let one = |i: usize| {
@@ -102,8 +102,9 @@ fn mean_iou(svd: &Svd, distance: f64, noise: f64) -> f64 {
 #[test]
 fn svd_does_not_mind_where_the_world_s_origin_is_when_it_is_normalised() {
     for distance in [0.0, 100.0, 1e4] {
-        let [scaled, raw] =
-            [true, false].map(|normalised| mean_iou(&Svd { normalised, ..Svd::default() }, distance, 2.0));
+        let [scaled, raw] = [true, false].map(|normalised| {
+            mean_iou(&SvdInitialiser { normalised, ..SvdInitialiser::default() }, distance, 2.0)
+        });
         println!("{distance} m away: mean IoU {scaled:.3} normalised, {raw:.3} not");
         assert!(scaled > 0.9);
         assert!(distance < 1e4 || raw < 0.5);
@@ -118,20 +119,26 @@ fn sides_at_the_border_are_left_out() {
         view.bounding_box.xmin = view.bounding_box.xmax - 3.0;
         view.observed[0] = false;
     }
-    let svd = Svd::default().initialise(&views).unwrap();
+    let svd = SvdInitialiser::default().initialise(&views).unwrap();
     assert!((svd.matrix() - truth.matrix()).norm() < 1e-6);
-    let rays = iou(&Rays::default().initialise(&views).unwrap(), &truth);
+    let rays = iou(&RaysInitialiser::default().initialise(&views).unwrap(), &truth);
     assert!(rays > 0.6, "{rays}");
     let few: Vec<_> =
-        views[..3].iter().map(|v| View { observed: [true, true, false, false], ..*v }).collect();
-    assert_eq!(Svd::default().initialise(&few), Err(InitialiseError::TooFewSides { found: 6, needed: 9 }));
-    assert_eq!(Rays::default().initialise(&few), Err(InitialiseError::TooFewSides { found: 0, needed: 6 }));
+        views[..3].iter().map(|v| ObjectView { observed: [true, true, false, false], ..*v }).collect();
+    assert_eq!(
+        SvdInitialiser::default().initialise(&few),
+        Err(InitialiseError::TooFewSides { found: 6, needed: 9 })
+    );
+    assert_eq!(
+        RaysInitialiser::default().initialise(&few),
+        Err(InitialiseError::TooFewSides { found: 0, needed: 6 })
+    );
 }
 
 #[test]
 fn rays_meet_at_the_object_whatever_the_noise() {
     check((any_object(), 0.0..3.0f64), |(truth, noise)| {
-        let found = Rays::default().initialise(&views(&truth, &arc(10, 3.0, 2.0), noise)).unwrap();
+        let found = RaysInitialiser::default().initialise(&views(&truth, &arc(10, 3.0, 2.0), noise)).unwrap();
         let (size, truth_norm) = (truth.semi_axes.max(), truth.semi_axes.norm());
         let off = (found.centroid() - truth.centroid()).norm();
         assert!(off < 0.1 * size + 0.02, "{off}");
@@ -145,7 +152,7 @@ fn rays_meet_at_the_object_whatever_the_noise() {
 #[test]
 fn two_views_are_enough_for_rays() {
     let truth = DualQuadric { pose: Se3::identity(), semi_axes: Vector3::repeat(0.2) };
-    let found = Rays::default().initialise(&views(&truth, &arc(2, 1.0, 2.0), 0.0)).unwrap();
+    let found = RaysInitialiser::default().initialise(&views(&truth, &arc(2, 1.0, 2.0), 0.0)).unwrap();
     assert!(found.centroid().norm() < 0.02 && (found.semi_axes - truth.semi_axes).norm() < 0.02);
 }
 
@@ -154,15 +161,15 @@ fn one_view_with_a_depth_is_enough() {
     check((any_object(), 0.0..6.0f64), |(truth, angle)| {
         let from = looking_from(Vector3::new(2.0 * angle.cos(), 2.0 * angle.sin(), 0.8));
         let views = views(&truth, &[from], 0.0);
-        let found = Depth::default().initialise(&views).unwrap();
+        let found = DepthInitialiser::default().initialise(&views).unwrap();
         let off = (found.centroid() - truth.centroid()).norm();
         assert!(off < truth.semi_axes.max(), "{off}");
         Ok(())
     });
     let ball = DualQuadric { pose: Se3::identity(), semi_axes: Vector3::repeat(0.2) };
-    let found = Depth::default().initialise(&views(&ball, &arc(1, 1.0, 2.0), 0.0)).unwrap();
+    let found = DepthInitialiser::default().initialise(&views(&ball, &arc(1, 1.0, 2.0), 0.0)).unwrap();
     assert!(found.centroid().norm() < 0.01 && (found.semi_axes - ball.semi_axes).norm() < 0.01);
-    let far = Depth { thickness: NotNegative::literal(0.0) }
+    let far = DepthInitialiser { thickness: NotNegative::literal(0.0) }
         .initialise(&views(&ball, &arc(1, 1.0, 2.0), 0.0))
         .unwrap();
     assert!((far.centroid().norm() - 0.2).abs() < 0.01, "the surface, taken for the centre");
@@ -172,20 +179,25 @@ fn one_view_with_a_depth_is_enough() {
 fn what_cannot_be_initialised_says_why() {
     let truth = DualQuadric { pose: Se3::identity(), semi_axes: Vector3::new(0.1, 0.15, 0.25) };
     let good = views(&truth, &arc(6, 3.0, 2.0), 0.0);
-    let all: [&dyn Initialiser; 3] = [&Svd::default(), &Rays::default(), &Depth::default()];
+    let all: [&dyn Initialiser; 3] =
+        [&SvdInitialiser::default(), &RaysInitialiser::default(), &DepthInitialiser::default()];
     for initialiser in all {
         assert!(matches!(initialiser.initialise(&[]), Err(InitialiseError::TooFewViews { found: 0, .. })));
         let mut nan = good.clone();
         nan[4].world_from_camera.translation.x = f64::NAN;
         assert_eq!(initialiser.initialise(&nan), Err(InitialiseError::NotFinite { view: 4 }));
     }
-    let deep: Vec<_> = good.iter().map(|v| View { depth: None, ..*v }).collect();
-    assert_eq!(Depth::default().initialise(&deep), Err(InitialiseError::NoDepth));
+    let deep: Vec<_> = good.iter().map(|v| ObjectView { depth: None, ..*v }).collect();
+    assert_eq!(DepthInitialiser::default().initialise(&deep), Err(InitialiseError::NoDepth));
     let same = [good[0]; 5];
-    assert!(matches!(Rays::default().initialise(&same), Err(InitialiseError::TooLittleParallax { .. })));
-    assert!(Svd::default().initialise(&same).is_err());
+    assert!(matches!(
+        RaysInitialiser::default().initialise(&same),
+        Err(InitialiseError::TooLittleParallax { .. })
+    ));
+    assert!(SvdInitialiser::default().initialise(&same).is_err());
     assert_eq!(
-        Rays { min_parallax: NotNegative::literal(0.0), ..Rays::default() }.initialise(&same),
+        RaysInitialiser { min_parallax: NotNegative::literal(0.0), ..RaysInitialiser::default() }
+            .initialise(&same),
         Err(InitialiseError::Undetermined)
     );
 
@@ -197,10 +209,12 @@ fn what_cannot_be_initialised_says_why() {
         let b = view.bounding_box;
         view.bounding_box = BoundingBox { xmin: 640.0 - b.xmax, xmax: 640.0 - b.xmin, ..b };
     }
-    for initialiser in [&Svd::default() as &dyn Initialiser, &Rays::default()] {
+    for initialiser in [&SvdInitialiser::default() as &dyn Initialiser, &RaysInitialiser::default()] {
         assert_eq!(initialiser.initialise(&behind), Err(InitialiseError::Behind { view: 0 }));
     }
-    let both = FirstOf { initialisers: vec![Box::new(Svd::default()), Box::new(Rays::default())] };
+    let both = FirstOfInitialiser {
+        initialisers: vec![Box::new(SvdInitialiser::default()), Box::new(RaysInitialiser::default())],
+    };
     let text = both.initialise(&behind).unwrap_err().to_string();
     assert!(text.starts_with("svd: ") && text.contains("; rays: the object came out behind"), "{text}");
     assert!(both.initialise(&good).is_ok());
@@ -216,7 +230,7 @@ fn boxes_of_different_objects_are_no_ellipsoid_and_say_so() {
             let [x, y] = [(i * 37 + k * 211) % 500, (i * 91 + k * 173) % 350].map(|n| n as f64);
             view.bounding_box = BoundingBox::new([x, y, x + 60.0, y + 90.0]).unwrap();
         }
-        match Svd::default().initialise(&mixed) {
+        match SvdInitialiser::default().initialise(&mixed) {
             Ok(q) => assert!(q.is_finite() && mixed.iter().all(|v| q.is_in_front_of(&v.world_from_camera))),
             Err(_) => rejected += 1,
         }

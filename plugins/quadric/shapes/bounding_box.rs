@@ -24,17 +24,17 @@ pub struct BoundingBox {
 /// Numbers that do not form a box.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected [xmin, ymin, xmax, ymax], finite, with xmin ≤ xmax and ymin ≤ ymax; got {0:?}")]
-pub struct NotABox(pub [f64; 4]);
+pub struct BoundingBoxError(pub [f64; 4]);
 
 impl BoundingBox {
     /// Creates the box from xmin, ymin, xmax, ymax.
     ///
     /// # Errors
     /// If a minimum is above its maximum, or a number is not finite.
-    pub fn new(bounds: [f64; 4]) -> Result<Self, NotABox> {
+    pub fn new(bounds: [f64; 4]) -> Result<Self, BoundingBoxError> {
         let [xmin, ymin, xmax, ymax] = bounds;
         let ordered = xmin <= xmax && ymin <= ymax && bounds.iter().all(|x| x.is_finite());
-        if ordered { Ok(Self::from_bounds(bounds)) } else { Err(NotABox(bounds)) }
+        if ordered { Ok(Self::from_bounds(bounds)) } else { Err(BoundingBoxError(bounds)) }
     }
     /// Creates a box from bounds known to be in order.
     pub(crate) fn from_bounds([xmin, ymin, xmax, ymax]: [f64; 4]) -> Self {
@@ -117,8 +117,8 @@ impl BoundingBox {
 }
 
 impl TryFrom<[f64; 4]> for BoundingBox {
-    type Error = NotABox;
-    fn try_from(bounds: [f64; 4]) -> Result<Self, NotABox> {
+    type Error = BoundingBoxError;
+    fn try_from(bounds: [f64; 4]) -> Result<Self, BoundingBoxError> {
         Self::new(bounds)
     }
 }

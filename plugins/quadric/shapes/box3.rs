@@ -28,7 +28,7 @@ struct Document {
 /// Corners that do not form a box.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected two corners of finite numbers with min ≤ max, got min = {min:?}, max = {max:?}")]
-pub struct NotABox3 {
+pub struct Box3Error {
     /// The corner given as minimum.
     pub min: [f64; 3],
     /// The corner given as maximum.
@@ -40,12 +40,12 @@ impl Box3 {
     ///
     /// # Errors
     /// If a coordinate of `min` is above the corresponding one of `max`, or not finite.
-    pub fn new(min: Vector3<f64>, max: Vector3<f64>) -> Result<Self, NotABox3> {
+    pub fn new(min: Vector3<f64>, max: Vector3<f64>) -> Result<Self, Box3Error> {
         let finite = Coordinates::new(min).is_ok() && Coordinates::new(max).is_ok();
         if finite && min <= max {
             Ok(Self { min, max })
         } else {
-            Err(NotABox3 { min: min.into(), max: max.into() })
+            Err(Box3Error { min: min.into(), max: max.into() })
         }
     }
     /// Creates the box with these dimensions around a point.
@@ -88,8 +88,8 @@ impl Box3 {
 }
 
 impl TryFrom<Document> for Box3 {
-    type Error = NotABox3;
-    fn try_from(d: Document) -> Result<Self, NotABox3> {
+    type Error = Box3Error;
+    fn try_from(d: Document) -> Result<Self, Box3Error> {
         Self::new(d.min.into(), d.max.into())
     }
 }

@@ -2,7 +2,7 @@
 use crate::shapes::Box3;
 use crate::shapes::ellipsoid;
 use crate::shapes::{SemiAxes, semi_axes};
-use manifactor_geometry::{Coordinates, NotARotation, Se3, So3};
+use manifactor_geometry::{Coordinates, RotationError, Se3, So3};
 use manifactor_graph::invariance::Random;
 use manifactor_graph::quantity::{Quantity, Shape};
 use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
@@ -104,7 +104,7 @@ impl DualQuadric {
 
 /// Rotates about `up`, moves and scales the object at random: orientation factors are invariant to all of
 /// these.
-pub(crate) fn turned(quadric: &DualQuadric, up: &Vector3<f64>, random: Random<'_>) -> DualQuadric {
+pub(crate) fn move_and_scale(quadric: &DualQuadric, up: &Vector3<f64>, random: Random<'_>) -> DualQuadric {
     let turn = So3::exp(&(up * random(3.0)));
     let moved = quadric.centroid() + Vector3::new(random(5.0), random(5.0), random(5.0));
     let pose = Se3::new(turn.compose(&quadric.pose.rotation), moved);
@@ -179,8 +179,8 @@ impl From<Centre> for [f64; 3] {
     }
 }
 impl TryFrom<[f64; 4]> for Xyzw {
-    type Error = NotARotation;
-    fn try_from(xyzw: [f64; 4]) -> Result<Self, NotARotation> {
+    type Error = RotationError;
+    fn try_from(xyzw: [f64; 4]) -> Result<Self, RotationError> {
         So3::from_quaternion_xyzw(xyzw).map(Self)
     }
 }

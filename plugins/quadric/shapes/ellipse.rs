@@ -37,7 +37,7 @@ impl<T: Scalar> Side<T> {
 }
 
 /// An ellipse with one image axis selected: its bounds along this axis, between borders across it.
-struct Along<T> {
+struct AxisBounds<T> {
     centre: T,
     across: T,
     /// Entries of Σ: along, mixed, across.
@@ -47,7 +47,7 @@ struct Along<T> {
     determinant: T,
 }
 
-impl<T: Scalar> Along<T> {
+impl<T: Scalar> AxisBounds<T> {
     /// Returns the end of the whole ellipse; `sign` is -1 for the lower end, 1 for the upper.
     #[inline(always)]
     fn end(&self, sign: f64) -> Side<T> {
@@ -97,8 +97,8 @@ impl<T: Scalar> Along<T> {
 
 impl<T: Scalar> Ellipse<T> {
     #[inline(always)]
-    fn along_x(&self) -> Along<T> {
-        Along {
+    fn along_x(&self) -> AxisBounds<T> {
+        AxisBounds {
             centre: self.centre.x,
             across: self.centre.y,
             aa: self.xx,
@@ -108,8 +108,8 @@ impl<T: Scalar> Ellipse<T> {
         }
     }
     #[inline(always)]
-    fn along_y(&self) -> Along<T> {
-        Along {
+    fn along_y(&self) -> AxisBounds<T> {
+        AxisBounds {
             centre: self.centre.y,
             across: self.centre.x,
             aa: self.yy,

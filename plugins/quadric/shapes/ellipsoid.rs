@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 /// z².
 ///
 /// Bounds grow without limit as the surface approaches the camera's plane.
-const MARGIN: f64 = 1e-6;
+const MIN_RELATIVE_DEPTH: f64 = 1e-6;
 
 /// An ellipsoid in the frame of a camera that looks along +z: the points centroid + axes·u, |u| ≤ 1.
 #[derive(Debug, Clone, Copy)]
@@ -22,7 +22,7 @@ pub struct Ellipsoid<T: Scalar = f64> {
 impl<T: Scalar> Ellipsoid<T> {
     /// Transforms a quadric to the frame of a camera.
     #[inline]
-    pub fn seen(world_from_camera: &Se3<T>, quadric: &DualQuadric<T>) -> Self {
+    pub fn in_camera_frame(world_from_camera: &Se3<T>, quadric: &DualQuadric<T>) -> Self {
         let mut axes = world_from_camera.rotation.between(&quadric.pose.rotation).matrix();
         for (mut axis, s) in axes.column_iter_mut().zip(&quadric.semi_axes) {
             axis *= *s;
@@ -40,5 +40,5 @@ impl<T: Scalar> Ellipsoid<T> {
 /// Checks z > 0 and z² - A₃₃ > 1e-6 z².
 #[inline]
 pub(crate) fn is_in_front<T: Scalar>(z: T, a33: T) -> bool {
-    z > T::zero() && z * z * (1.0 - MARGIN) > a33
+    z > T::zero() && z * z * (1.0 - MIN_RELATIVE_DEPTH) > a33
 }

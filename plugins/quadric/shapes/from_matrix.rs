@@ -1,13 +1,13 @@
 //! Conversion of a dual quadric, given as a matrix, to an ellipsoid.
 use crate::shapes::DualQuadric;
-use crate::shapes::{NotSemiAxes, SemiAxes};
+use crate::shapes::{SemiAxes, SemiAxesError};
 use manifactor_geometry::{Se3, So3};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
 /// The reason why a 4×4 matrix is not the dual quadric of an ellipsoid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum NotAnEllipsoid {
+pub enum EllipsoidError {
     /// An entry is not a number.
     #[error("the matrix has an entry that is not finite")]
     NotFinite,
@@ -28,7 +28,7 @@ pub enum NotAnEllipsoid {
     },
     /// The ellipsoid is flat or unbounded.
     #[error("the surface is degenerate: {0}")]
-    Degenerate(#[from] NotSemiAxes),
+    Degenerate(#[from] SemiAxesError),
 }
 
 /// Treatment of a surface that is not an ellipsoid.
@@ -50,7 +50,7 @@ impl DualQuadric {
     ///
     /// # Errors
     /// If the surface is not an ellipsoid; a hyperboloid is rejected.
-    pub fn from_matrix(matrix: &Matrix4<f64>) -> Result<Self, NotAnEllipsoid> {
+    pub fn from_matrix(matrix: &Matrix4<f64>) -> Result<Self, EllipsoidError> {
         Self::from_matrix_or(matrix, OnHyperboloid::Reject)
     }
 
@@ -58,9 +58,9 @@ impl DualQuadric {
     ///
     /// # Errors
     /// As for [`DualQuadric::from_matrix`].
-    pub fn from_matrix_or(matrix: &Matrix4<f64>, policy: OnHyperboloid) -> Result<Self, NotAnEllipsoid> {
+    pub fn from_matrix_or(matrix: &Matrix4<f64>, policy: OnHyperboloid) -> Result<Self, EllipsoidError> {
         if !matrix.iter().all(|x| x.is_finite()) {
-            return Err(NotAnEllipsoid::NotFinite);
+            return Err(EllipsoidError::NotFinite);
         }
         let corner = matrix[(3, 3)];
         let q = (matrix + matrix.transpose()) * (-0.5 / corner);
@@ -68,14 +68,14 @@ impl DualQuadric {
         // Q* = [A - ttᵀ, -t; -tᵀ, -1]
         let shape: Matrix3<f64> = q.fixed_view::<3, 3>(0, 0) + centroid * centroid.transpose();
         if !shape.iter().all(|x| x.is_finite()) {
-            return Err(NotAnEllipsoid::AtInfinity { corner });
+            return Err(EllipsoidError::AtInfinity { corner });
         }
         let eigen = shape.symmetric_eigen();
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
         let squares = order.map(|i| eigen.eigenvalues[i]);
         if policy == OnHyperboloid::Reject && !squares.iter().all(|s| *s > 0.0) {
-            return Err(NotAnEllipsoid::NotPositive { squares });
+            return Err(EllipsoidError::NotPositive { squares });
         }
         let mut axes = Matrix3::from_columns(&order.map(|i| eigen.eigenvectors.column(i)));
         if axes.determinant() < 0.0 {
@@ -108,12 +108,12 @@ mod tests {
         let diagonal = |a, b, c, d| Matrix4::from_diagonal(&nalgebra::Vector4::new(a, b, c, d));
         let read = |m: Matrix4<f64>| DualQuadric::from_matrix(&m).unwrap_err();
         let hyperboloid = diagonal(1.0, -0.25, 0.5, -1.0);
-        assert_eq!(read(hyperboloid), NotAnEllipsoid::NotPositive { squares: [1.0, 0.5, -0.25] });
-        assert!(matches!(read(diagonal(1.0, 1.0, 1.0, 1.0)), NotAnEllipsoid::NotPositive { .. }));
-        assert!(matches!(read(diagonal(1.0, 1.0, 0.0, -1.0)), NotAnEllipsoid::NotPositive { .. }));
-        assert!(matches!(read(diagonal(1.0, 1.0, 1e-30, -1.0)), NotAnEllipsoid::Degenerate(_)));
-        assert!(matches!(read(diagonal(1.0, 1.0, 1.0, 0.0)), NotAnEllipsoid::AtInfinity { .. }));
-        assert_eq!(read(diagonal(1.0, f64::NAN, 1.0, -1.0)), NotAnEllipsoid::NotFinite);
+        assert_eq!(read(hyperboloid), EllipsoidError::NotPositive { squares: [1.0, 0.5, -0.25] });
+        assert!(matches!(read(diagonal(1.0, 1.0, 1.0, 1.0)), EllipsoidError::NotPositive { .. }));
+        assert!(matches!(read(diagonal(1.0, 1.0, 0.0, -1.0)), EllipsoidError::NotPositive { .. }));
+        assert!(matches!(read(diagonal(1.0, 1.0, 1e-30, -1.0)), EllipsoidError::Degenerate(_)));
+        assert!(matches!(read(diagonal(1.0, 1.0, 1.0, 0.0)), EllipsoidError::AtInfinity { .. }));
+        assert_eq!(read(diagonal(1.0, f64::NAN, 1.0, -1.0)), EllipsoidError::NotFinite);
         let absolute = DualQuadric::from_matrix_or(&hyperboloid, OnHyperboloid::Absolute).unwrap();
         assert!((absolute.semi_axes - Vector3::new(1.0, 0.5f64.sqrt(), 0.5)).norm() < 1e-15);
     }

@@ -6,9 +6,9 @@ use std::borrow::Cow;
 
 /// Minimum semi-axis, in metres. Fourth powers of lengths within the bounds are normal floating-point
 /// numbers.
-pub const SHORTEST: f64 = 1e-9;
+pub const MIN_SEMI_AXIS: f64 = 1e-9;
 /// Maximum semi-axis, in metres.
-pub const LONGEST: f64 = 1e9;
+pub const MAX_SEMI_AXIS: f64 = 1e9;
 
 /// Three lengths from 1e-9 to 1e9 metres, checked when read.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -18,11 +18,11 @@ pub struct SemiAxes(Vector3<f64>);
 /// Lengths that are not valid semi-axes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected three semi-axes from 1e-9 to 1e9 metres, got {0:?}")]
-pub struct NotSemiAxes(pub [f64; 3]);
+pub struct SemiAxesError(pub [f64; 3]);
 
 /// Returns s·exp(δ), clamped to the bounds. NaN stays NaN.
 pub(crate) fn step(s: f64, delta: f64) -> f64 {
-    (s * delta.exp()).clamp(SHORTEST, LONGEST)
+    (s * delta.exp()).clamp(MIN_SEMI_AXIS, MAX_SEMI_AXIS)
 }
 
 impl SemiAxes {
@@ -30,9 +30,9 @@ impl SemiAxes {
     ///
     /// # Errors
     /// If one is not a number from 1e-9 to 1e9.
-    pub fn new(s: Vector3<f64>) -> Result<Self, NotSemiAxes> {
-        let fits = s.iter().all(|s| (SHORTEST..=LONGEST).contains(s));
-        if fits { Ok(Self(s)) } else { Err(NotSemiAxes(s.into())) }
+    pub fn new(s: Vector3<f64>) -> Result<Self, SemiAxesError> {
+        let fits = s.iter().all(|s| (MIN_SEMI_AXIS..=MAX_SEMI_AXIS).contains(s));
+        if fits { Ok(Self(s)) } else { Err(SemiAxesError(s.into())) }
     }
     /// Wraps lengths for writing, without a check.
     pub(crate) fn unchecked(s: Vector3<f64>) -> Self {
@@ -45,8 +45,8 @@ impl SemiAxes {
 }
 
 impl TryFrom<[f64; 3]> for SemiAxes {
-    type Error = NotSemiAxes;
-    fn try_from(s: [f64; 3]) -> Result<Self, NotSemiAxes> {
+    type Error = SemiAxesError;
+    fn try_from(s: [f64; 3]) -> Result<Self, SemiAxesError> {
         Self::new(s.into())
     }
 }
@@ -65,7 +65,7 @@ impl JsonSchema for SemiAxes {
         "SemiAxes".into()
     }
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        let length = json_schema!({ "type": "number", "minimum": SHORTEST, "maximum": LONGEST });
+        let length = json_schema!({ "type": "number", "minimum": MIN_SEMI_AXIS, "maximum": MAX_SEMI_AXIS });
         json_schema!({ "type": "array", "items": length, "minItems": 3, "maxItems": 3 })
     }
 }

@@ -179,7 +179,7 @@ fn constrain(input: &Node<'_>, output: &Node<'_>, differs: bool) -> Checked {
 
 fn visibility(input: &Node<'_>, output: &Node<'_>) -> Checked {
     let (q, pose) = (input.quadric()?, input.camera_pose()?);
-    let seen = Ellipsoid::seen(&pose, &q);
+    let seen = Ellipsoid::in_camera_frame(&pose, &q);
     output.each(|key, node| {
         Some(match key {
             "isBehind" => node.is_bool(seen.centroid.z < 0.0),
@@ -201,7 +201,7 @@ fn conic(conic: &DualConic, key: &str, node: &Node<'_>) -> Option<Checked> {
 
 fn projection(input: &Node<'_>, output: &Node<'_>) -> Checked {
     let (q, pose, camera) = (input.quadric()?, input.camera_pose()?, input.camera()?);
-    let seen = Ellipsoid::seen(&pose, &q);
+    let seen = Ellipsoid::in_camera_frame(&pose, &q);
     let dual = seen.dual_conic(&camera);
     output.each(|key, node| match key {
         "P_3x4" => Some(node.is(dense(camera.projection(&pose)), VALUES)),
@@ -261,7 +261,7 @@ fn failing_factor(input: &Node<'_>) -> Checked {
 
 fn truncated_factor(input: &Node<'_>, output: &Node<'_>) -> Checked {
     let (pose, q, camera) = (input.camera_pose()?, input.quadric()?, input.camera()?);
-    let seen = Ellipsoid::seen(&pose, &q);
+    let seen = Ellipsoid::in_camera_frame(&pose, &q);
     let outline = seen.is_in_front().then(|| seen.outline(&camera));
     let box_of = |bounds: Option<[f64; 4]>| bounds.and_then(|b| BoundingBox::new(b).ok());
     output.each(|key, node| {
@@ -317,7 +317,7 @@ fn box3(input: &Node<'_>, output: &Node<'_>) -> Checked {
 
 fn view(input: &Node<'_>, output: &Node<'_>) -> Checked {
     let (q, pose, camera) = (input.quadric()?, input.camera_pose()?, input.camera()?);
-    let seen = Ellipsoid::seen(&pose, &q);
+    let seen = Ellipsoid::in_camera_frame(&pose, &q);
     let outline = seen.is_in_front().then(|| seen.outline(&camera)).ok_or("it should be in front")?;
     let up = Direction::new(input.get("up")?.vector()?).map_err(|e| e.to_string())?;
     let mut squares = q.semi_axes.map(|s| s * s).as_slice().to_vec();

@@ -38,12 +38,12 @@ fn directions<'a>(open: &'a Undetermined, key: &str) -> BTreeSet<&'a str> {
     open.direction.iter().filter(|(k, _, _)| k.as_str() == key).map(|(_, name, _)| *name).collect()
 }
 
-fn thing(semi_axes: Vector3<f64>) -> DualQuadric {
+fn object(semi_axes: Vector3<f64>) -> DualQuadric {
     DualQuadric { pose: Se3::exp(&jitter(3, 0.2)), semi_axes }
 }
 
 /// Fixed cameras that measure one quadric, with the initial value at the truth.
-fn seen(thing: &DualQuadric, eyes: &[Vector3<f64>]) -> (Graph, Values) {
+fn view_of(thing: &DualQuadric, eyes: &[Vector3<f64>]) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     for (i, eye) in eyes.iter().enumerate() {
         let pose = looking(*eye, Vector3::zeros());
@@ -80,8 +80,8 @@ fn a_pose_that_nothing_sees_is_named_alone() {
 #[test]
 fn the_rotation_of_a_ball_is_open_and_nothing_else() {
     let eyes: Vec<_> = (0..12).map(|i| 3.0 * jitter::<3>(i, 1.0).normalize()).collect();
-    let ball = thing(Vector3::repeat(0.2));
-    let (graph, mut values) = seen(&ball, &eyes);
+    let ball = object(Vector3::repeat(0.2));
+    let (graph, mut values) = view_of(&ball, &eyes);
     let at_rest = solve(&graph, &values, &GaussNewton::default(), &mut Silent).unwrap();
     assert!(
         at_rest.outcome.termination.is_converged(),
@@ -100,10 +100,10 @@ fn the_rotation_of_a_ball_is_open_and_nothing_else() {
 
 #[test]
 fn a_quadric_that_is_seen_from_one_side_is_open() {
-    let thing = thing(Vector3::new(0.1, 0.2, 0.3));
+    let thing = object(Vector3::new(0.1, 0.2, 0.3));
     for looks in [1, 5] {
         // The result does not depend on the number of views from one place.
-        let (graph, mut values) = seen(&thing, &vec![Vector3::new(3.0, 0.0, 0.5); looks]);
+        let (graph, mut values) = view_of(&thing, &vec![Vector3::new(3.0, 0.0, 0.5); looks]);
         let diagnosis =
             solve(&graph, &values, &Auto::default(), &mut Silent).unwrap().diagnose(&graph).unwrap();
         values.insert("q", thing.retract(&jitter(1, 0.02)));

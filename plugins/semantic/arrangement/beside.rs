@@ -28,7 +28,7 @@ pub struct Beside {
 }
 
 /// Distance, in metres, below which the direction between two objects is undefined.
-const SAME_PLACE: f64 = 1e-6;
+const MIN_DISTANCE_M: f64 = 1e-6;
 
 impl Beside {
     fn across<T: Scalar>(&self, a: &DualQuadric<T>, b: &DualQuadric<T>) -> Vector3<T> {
@@ -48,7 +48,7 @@ impl Residual for Beside {
         Vector1::new(length - extent(&a, &u) - extent(&b, &u) - T::from(self.gap))
     }
     fn is_defined(&self, (a, b): Refs<'_, Self::Variables>) -> bool {
-        self.across(a, b).norm() > SAME_PLACE
+        self.across(a, b).norm() > MIN_DISTANCE_M
     }
 }
 register_factor!("beside", Beside, up);

@@ -21,7 +21,7 @@ use manifactor_quadric::DualQuadric;
 pub struct Collinear {}
 
 /// Distance, in metres, below which two points do not define a line.
-const SAME_PLACE: f64 = 1e-6;
+const MIN_DISTANCE_M: f64 = 1e-6;
 
 impl Residual for Collinear {
     type Variables = (DualQuadric, DualQuadric, DualQuadric);
@@ -32,7 +32,7 @@ impl Residual for Collinear {
         (b.centroid() - a.centroid()).cross(&(line / line.norm_squared().sqrt()))
     }
     fn is_defined(&self, (a, _, c): Refs<'_, Self::Variables>) -> bool {
-        (c.centroid() - a.centroid()).norm() > SAME_PLACE
+        (c.centroid() - a.centroid()).norm() > MIN_DISTANCE_M
     }
 }
 register_factor!("collinear", Collinear);

@@ -49,7 +49,7 @@ impl Residual for ConicDistance {
     type Dim = U6;
 
     fn residual<T: Scalar>(&self, (pose, quadric): Lifted<Self::Variables, T>) -> SVector<T, 6> {
-        let seen = Ellipsoid::seen(&pose, &quadric);
+        let seen = Ellipsoid::in_camera_frame(&pose, &quadric);
         if !seen.is_in_front() {
             return SVector::zeros();
         }
@@ -96,7 +96,7 @@ mod tests {
             |((camera, pose, quadric), a, ratio, angle)| {
                 let semi_axes = [a, a * ratio].map(|s| Positive::new(s).unwrap());
                 let factor = ConicDistance { centre: [300.0, 200.0], semi_axes, angle, camera };
-                let outline = Ellipsoid::seen(&pose, &quadric).outline(&camera);
+                let outline = Ellipsoid::in_camera_frame(&pose, &quadric).outline(&camera);
                 let (shape, measured) = (
                     Matrix2::new(outline.xx, outline.xy, outline.xy, outline.yy),
                     factor.root() * factor.root(),

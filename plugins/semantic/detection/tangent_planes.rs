@@ -49,7 +49,7 @@ impl Residual for TangentPlanes {
     type Dim = U4;
 
     fn residual<T: Scalar>(&self, (pose, quadric): Lifted<Self::Variables, T>) -> Vector4<T> {
-        let seen = Ellipsoid::seen(&pose, &quadric);
+        let seen = Ellipsoid::in_camera_frame(&pose, &quadric);
         let normals = self.normals();
         Vector4::from_fn(|k, _| {
             let n: RowVector3<T> = normals[k].map(T::from).transpose();

@@ -25,7 +25,7 @@ pub enum Axis {
 
 impl Axis {
     /// Returns the unit direction of the axis. The sign of the longest and the shortest axis is arbitrary.
-    pub fn of<T: Scalar>(self, quadric: &DualQuadric<T>) -> Vector3<T> {
+    pub fn direction<T: Scalar>(self, quadric: &DualQuadric<T>) -> Vector3<T> {
         let s = &quadric.semi_axes;
         let index = match self {
             Self::Longest => return quadric.major_axis(),

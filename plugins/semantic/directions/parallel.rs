@@ -29,7 +29,7 @@ impl Residual for Parallel {
     type Dim = U3;
 
     fn residual<T: Scalar>(&self, (a, b): Lifted<Self::Variables, T>) -> Vector3<T> {
-        self.axes[0].of(&a).cross(&self.axes[1].of(&b))
+        self.axes[0].direction(&a).cross(&self.axes[1].direction(&b))
     }
 }
 register_factor!("parallel", Parallel);
@@ -38,7 +38,7 @@ register_invariance!(
     "turning an object about its axis, and moving it",
     |factor, (a, b), random| {
         let mut moved = *b;
-        let turn = manifactor_geometry::So3::exp(&(factor.axes[1].of(b) * random(3.0)));
+        let turn = manifactor_geometry::So3::exp(&(factor.axes[1].direction(b) * random(3.0)));
         moved.pose.rotation = turn.compose(&b.pose.rotation);
         moved.pose.translation += Vector3::new(random(5.0), random(5.0), random(5.0));
         (*a, moved)

@@ -84,7 +84,7 @@ mod tests {
 
     factor_laws! { resting, resting_along }
 
-    fn of(quadric: DualQuadric) -> f64 {
+    fn imbalance_of(quadric: DualQuadric) -> f64 {
         Resting::default().residual::<f64>((quadric,)).norm()
     }
 
@@ -94,7 +94,7 @@ mod tests {
             for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
                 let turn = manifactor_geometry::So3::exp(&(axis * std::f64::consts::FRAC_PI_2));
                 quadric.pose.rotation = turn;
-                assert!(of(quadric) < 1e-12);
+                assert!(imbalance_of(quadric) < 1e-12);
             }
             Ok(())
         });
@@ -107,13 +107,13 @@ mod tests {
             let squares = quadric.semi_axes.map(|s| s * s);
             let (long, across) = (squares.z, squares.y);
             let expected = (long - across) / squares.norm() * tilt.sin() * tilt.cos();
-            assert!((of(quadric) - expected).abs() < 1e-12, "{tilt}");
+            assert!((imbalance_of(quadric) - expected).abs() < 1e-12, "{tilt}");
         }
     }
 
     #[test]
     fn a_ball_rests_however_it_is_turned() {
-        assert!(of(DualQuadric { semi_axes: Vector3::repeat(0.2), ..tilted(0.4) }) < 1e-15);
+        assert!(imbalance_of(DualQuadric { semi_axes: Vector3::repeat(0.2), ..tilted(0.4) }) < 1e-15);
     }
 
     #[test]
@@ -127,7 +127,7 @@ mod tests {
         });
         let lowest = surface.min_by(|p, q| p.z.total_cmp(&q.z)).unwrap();
         // The lowest point is -Q up / √(upᵀ Q up), at the depth √(upᵀ Q up).
-        let to_the_side = of(quadric) * quadric.semi_axes.map(|s| s * s).norm() / -lowest.z;
+        let to_the_side = imbalance_of(quadric) * quadric.semi_axes.map(|s| s * s).norm() / -lowest.z;
         assert!((lowest.y.abs() - to_the_side).abs() < 1e-5, "{lowest} {to_the_side}");
     }
 }

@@ -33,12 +33,12 @@ impl Residual for Upright {
     type Dim = U3;
 
     fn residual<T: Scalar>(&self, (quadric,): Lifted<Self::Variables, T>) -> Vector3<T> {
-        self.axis.of(&quadric).cross(&self.up.lift())
+        self.axis.direction(&quadric).cross(&self.up.lift())
     }
 }
 register_factor!("upright", Upright, up);
 register_invariance!(Upright, "moving, growing, and turning about its axis", |factor, (quadric,), random| {
-    let turn = manifactor_geometry::So3::exp(&(factor.axis.of(quadric) * random(3.0)));
+    let turn = manifactor_geometry::So3::exp(&(factor.axis.direction(quadric) * random(3.0)));
     let mut moved = *quadric;
     moved.pose.rotation = turn.compose(&quadric.pose.rotation);
     moved.pose.translation += Vector3::new(random(5.0), random(5.0), random(5.0));
@@ -71,7 +71,7 @@ impl Residual for UprightAlong {
     type Dim = U3;
 
     fn residual<T: Scalar>(&self, (quadric, up): Lifted<Self::Variables, T>) -> Vector3<T> {
-        self.axis.of(&quadric).cross(&up)
+        self.axis.direction(&quadric).cross(&up)
     }
 }
 register_factor!("upright_along", UprightAlong);

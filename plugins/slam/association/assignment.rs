@@ -2,7 +2,7 @@
 use pathfinding::prelude::{Matrix, kuhn_munkres};
 
 /// Resolution of the gains. The solver works with integers.
-const UNIT: f64 = 1e-6;
+const GAIN_RESOLUTION: f64 = 1e-6;
 
 /// Matches each row with at most one column, and each column with at most one row, so that the sum of the
 /// gains is largest (the Hungarian method).
@@ -24,7 +24,7 @@ pub fn best_assignment(rows: usize, columns: usize, gains: &[(usize, usize, f64)
     // one extra column without gain per row, for rows that stay unmatched
     let mut weights = Matrix::new(rows, columns + rows, 0_i64);
     for (row, column, gain) in gains {
-        weights[(*row, *column)] = (gain / UNIT).max(0.0) as i64;
+        weights[(*row, *column)] = (gain / GAIN_RESOLUTION).max(0.0) as i64;
     }
     let (_, matched) = kuhn_munkres(&weights);
     let is_match = |(row, column): &(usize, usize)| *column < columns && weights[(*row, *column)] > 0;

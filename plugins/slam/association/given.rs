@@ -1,7 +1,7 @@
-use super::{Association, Associator, Image, Learned, Map};
+use super::{Association, Associator, Corrections, FrameDetections, MapEstimate};
 use manifactor_graph::register;
 use manifactor_quadric::Camera;
-use manifactor_recording::class::Aliases;
+use manifactor_recording::class::ClassAliases;
 use manifactor_recording::prior_map::PriorObject;
 use manifactor_recording::sequence::ObjectId;
 use schemars::JsonSchema;
@@ -15,26 +15,32 @@ use std::sync::Arc;
 /// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Given {}
+#[schemars(rename = "Given")]
+pub struct GivenAssociation {}
 
 #[typetag::serialize(name = "given")]
-impl Association for Given {
-    fn begin(&self, _: Camera, _: &Aliases, _: &[Arc<PriorObject>]) -> Box<dyn Associator> {
+impl Association for GivenAssociation {
+    fn create_associator(&self, _: Camera, _: &ClassAliases, _: &[Arc<PriorObject>]) -> Box<dyn Associator> {
         Box::new(Self {})
     }
 
-    fn uses_names(&self) -> bool {
+    fn uses_source_ids(&self) -> bool {
         true
     }
 }
-register!(dyn Association, "given", Given);
+register!(dyn Association, "given", GivenAssociation);
 
-impl Associator for Given {
-    fn associate(&self, image: &Image<'_>, _map: &dyn Map) -> Vec<Option<ObjectId>> {
+impl Associator for GivenAssociation {
+    fn associate(&self, image: &FrameDetections<'_>, _map: &dyn MapEstimate) -> Vec<Option<ObjectId>> {
         image.detections.iter().map(|detection| detection.object).collect()
     }
 
-    fn learn(&mut self, _image: &Image<'_>, _names: &[Option<ObjectId>], _map: &dyn Map) -> Learned {
-        Learned::default()
+    fn learn_from_frame(
+        &mut self,
+        _image: &FrameDetections<'_>,
+        _names: &[Option<ObjectId>],
+        _map: &dyn MapEstimate,
+    ) -> Corrections {
+        Corrections::default()
     }
 }

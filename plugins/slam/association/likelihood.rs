@@ -13,8 +13,8 @@ use fit::BoxNoise;
 use manifactor_graph::checked::{Positive, Share};
 use manifactor_graph::register;
 use manifactor_quadric::Camera;
-use manifactor_recording::class::Aliases;
-use manifactor_recording::measurement::{Errors, Quantities, UsualDepth};
+use manifactor_recording::class::ClassAliases;
+use manifactor_recording::measurement::{MeasurementSigmas, Quantities, UsualDepth};
 use manifactor_recording::prior_map::PriorObject;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -43,7 +43,8 @@ use tracker::Tracker;
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Likelihood {
+#[schemars(rename = "Likelihood")]
+pub struct LikelihoodAssociation {
     /// Standard deviation of the sides of a box. Unit: pixels.
     pub box_sigma: Positive,
     /// Standard deviation of the sides of a box, relative to its width and height. The variances of
@@ -76,7 +77,7 @@ pub struct Likelihood {
     pub second_look_s: Positive,
 }
 
-impl Default for Likelihood {
+impl Default for LikelihoodAssociation {
     fn default() -> Self {
         Self {
             box_sigma: Positive::literal(4.0),
@@ -97,23 +98,28 @@ impl Default for Likelihood {
 }
 
 #[typetag::serialize(name = "likelihood")]
-impl Association for Likelihood {
-    fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator> {
+impl Association for LikelihoodAssociation {
+    fn create_associator(
+        &self,
+        camera: Camera,
+        aliases: &ClassAliases,
+        known: &[Arc<PriorObject>],
+    ) -> Box<dyn Associator> {
         let (settings, aliases) = (self.clone(), aliases.clone());
         Box::new(Tracker::new(settings, camera, aliases, known))
     }
 }
-register!(dyn Association, "likelihood", Likelihood);
+register!(dyn Association, "likelihood", LikelihoodAssociation);
 
-impl Likelihood {
+impl LikelihoodAssociation {
     fn noise(&self) -> BoxNoise {
-        let others = Errors { depth: *self.depth_error };
+        let others = MeasurementSigmas { depth: *self.depth_error };
         BoxNoise { px: *self.box_sigma, of_size: *self.box_sigma_of_size, others }
     }
 
     /// Returns the likelihood of a class, given its share of the votes of an object.
-    fn likelihood(&self, share: f64) -> f64 {
-        (1.0 - *self.class_error) * share + *self.class_error / CLASSES
+    fn class_likelihood(&self, share: f64) -> f64 {
+        (1.0 - *self.class_error) * share + *self.class_error / CLASS_COUNT
     }
 
     /// Returns the cost of a box that shows a new object: the box lies anywhere in the image, with any size
@@ -122,9 +128,9 @@ impl Likelihood {
         let area = camera.size().product();
         let usual = UsualDepth { depth: usual, spread: *self.depth_spread };
         let of_others: f64 = quantities.iter().map(|measurement| measurement.cost_of_new(&usual)).sum();
-        of_others - 2.0 * (*self.new_objects / (area * area / 4.0) / CLASSES).ln()
+        of_others - 2.0 * (*self.new_objects / (area * area / 4.0) / CLASS_COUNT).ln()
     }
 }
 
 /// Number of classes that a wrong box may have. The result hardly depends on it.
-const CLASSES: f64 = 20.0;
+const CLASS_COUNT: f64 = 20.0;

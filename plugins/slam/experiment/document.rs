@@ -6,18 +6,18 @@ mod shard;
 mod summary_settings;
 
 use crate::trial::Trial;
-use axis::{Axis, AxisDocument, Choice, Column};
+use axis::{Axis, AxisChoice, AxisDocument, Column};
 use manifactor_config::{Diagnostics, Document, Errors, Fault, Node, merge};
-use manifactor_mapping::settings::Settings;
-use manifactor_mapping::settings::run_document::{absolute, split, stem};
-use names::Names;
+use manifactor_mapping::settings::RunSettings;
+use manifactor_mapping::settings::run_document::{absolute_path, document_stem, split_document};
+use names::SummaryNameCheck;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Map;
 use std::path::{Path, PathBuf};
 
-pub(crate) use shard::folders;
-pub use shard::{NoShard, Shard};
+pub(crate) use shard::shard_folders;
+pub use shard::{Shard, ShardError};
 pub use summary_settings::SummarySettings;
 
 /// An experiment: all its trials, in the order of the table.
@@ -37,7 +37,7 @@ pub struct Experiment {
     pub folder: PathBuf,
     /// The experiment and its base as they were read, including values that the caller has set. They are
     /// written beside the results.
-    pub documents: Documents,
+    pub documents: ExperimentSources,
 }
 
 /// An experiment in its document: a run over a grid of settings and seeds.
@@ -67,7 +67,7 @@ pub(crate) struct ExperimentDocument {
 
 /// Documents that reproduce an experiment.
 #[derive(Debug, Clone, Default)]
-pub struct Documents {
+pub struct ExperimentSources {
     /// Document of the experiment, which refers to `base.toml`.
     pub experiment: serde_json::Value,
     /// Document of the run.
@@ -75,9 +75,9 @@ pub struct Documents {
 }
 
 /// Column of the base's variants.
-const VARIANT: &str = "variant";
+const VARIANT_COLUMN: &str = "variant";
 /// Largest number of trials; more of them are likely a mistake in a list.
-const MOST: usize = 1_000_000;
+const MAX_TRIALS: usize = 1_000_000;
 
 impl Experiment {
     /// Reads an experiment and its base. Paths are relative to the folder of the base.
@@ -86,25 +86,32 @@ impl Experiment {
     /// All errors in both documents. If settings of trials are invalid, only the errors of the first such
     /// trial are returned.
     pub fn read(document: &Document) -> Result<Self, Diagnostics> {
-        let stem = stem(document, "experiment");
+        let stem = document_stem(document, "experiment");
         let errors = Errors::new();
         let read = document.root().read::<ExperimentDocument>(&errors).and_then(|written| {
             let base = open_base(document, &written.base, &errors)?;
-            let (header, mut node) = split(base.root(), &errors)?;
+            let (header, mut node) = split_document(base.root(), &errors)?;
             let folder = header.folder(&base);
             let mut axes: Vec<Axis> =
                 written.axes.into_iter().filter_map(|axis| Axis::read(axis, &errors)).collect();
-            let has_variants = |axis: &Axis| axis.columns.iter().any(|column| column.name == VARIANT);
+            let has_variants = |axis: &Axis| axis.columns.iter().any(|column| column.name == VARIANT_COLUMN);
             if !header.variants.is_empty() && !axes.iter().any(has_variants) {
                 let place = base.source().place(0..0);
-                axes.push(Axis::of_options(Column { name: VARIANT.to_owned(), place }, header.variants));
+                axes.push(Axis::of_options(
+                    Column { name: VARIANT_COLUMN.to_owned(), place },
+                    header.variants,
+                ));
             }
-            check::axes(&axes, &errors);
+            check::check_axes(&axes, &errors);
             let summary = written.summary.as_ref().and_then(|node| node.read(&errors)).unwrap_or_default();
             let place =
                 written.summary.as_ref().map_or_else(|| document.root().place.clone(), |s| s.place.clone());
-            let names =
-                Names { settings: &summary, written: written.summary.as_ref(), place, errors: &errors };
+            let names = SummaryNameCheck {
+                settings: &summary,
+                written: written.summary.as_ref(),
+                place,
+                errors: &errors,
+            };
             names.check(&axes);
             if let Some(set) = written.set {
                 merge(&mut node, set);
@@ -114,14 +121,14 @@ impl Experiment {
             let columns = axes.into_iter().flat_map(|axis| axis.columns).map(|column| column.name).collect();
             let title = written.title.unwrap_or_else(|| stem.clone());
             let output = written.output.unwrap_or_else(|| Path::new("out").join(&stem));
-            let documents = Documents::new((&title, document), &base, &folder, &errors)?;
+            let documents = ExperimentSources::new((&title, document), &base, &folder, &errors)?;
             Some(Self { title, output, columns, trials, summary, folder, documents })
         });
         errors.finish(read)
     }
 }
 
-impl Documents {
+impl ExperimentSources {
     fn new(
         (title, experiment): (&str, &Document),
         base: &Document,
@@ -139,7 +146,7 @@ impl Documents {
         let (mut experiment, mut base) = (json(experiment)?, json(base)?);
         experiment.insert("title".to_owned(), title.into());
         experiment.insert("base".to_owned(), "base.toml".into());
-        base.insert("folder".to_owned(), absolute(folder).display().to_string().into());
+        base.insert("folder".to_owned(), absolute_path(folder).display().to_string().into());
         Some(Self { experiment: experiment.into(), base: base.into() })
     }
 }
@@ -153,8 +160,8 @@ fn open_base(document: &Document, name: &str, errors: &Errors) -> Option<Documen
 /// Returns the trials of all combinations; the last axis changes fastest.
 fn trials(base: &Node, axes: &[Axis], folder: &Path, errors: &Errors) -> Option<Vec<Trial>> {
     let count = axes.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.options.len()));
-    if count.is_none_or(|count| count > MOST) {
-        let message = format!("the axes make more than {MOST} trials");
+    if count.is_none_or(|count| count > MAX_TRIALS) {
+        let message = format!("the axes make more than {MAX_TRIALS} trials");
         errors.report(base.place.clone(), Fault::invalid(message));
         return None;
     }
@@ -181,7 +188,7 @@ fn trials(base: &Node, axes: &[Axis], folder: &Path, errors: &Errors) -> Option<
 
 fn trial<'a>(
     base: &Node,
-    choices: impl Iterator<Item = &'a Choice>,
+    choices: impl Iterator<Item = &'a AxisChoice>,
     folder: &Path,
 ) -> Result<Trial, Diagnostics> {
     let (mut node, mut labels) = (base.clone(), vec![]);
@@ -191,5 +198,5 @@ fn trial<'a>(
             merge(&mut node, set.clone());
         }
     }
-    Ok(Trial { labels, settings: Settings::read(&node, folder)? })
+    Ok(Trial { labels, settings: RunSettings::read(&node, folder)? })
 }

@@ -4,9 +4,9 @@
 //! A trial with an incomplete line is run again. If a trial has several lines, the last one counts, because a
 //! failed trial may be run again. Lines of trials that the experiment no longer contains are ignored. An
 //! experiment that was changed therefore runs only its new trials.
-use crate::document::folders;
+use crate::document::shard_folders;
 use crate::trial::{Trial, TrialRecord};
-use manifactor_formats::journal::{Journal, JournalError, Record, read};
+use manifactor_formats::journal::{Journal, JournalError, JournalRecord, read};
 use manifactor_run::output::OutputFolder;
 use std::collections::HashMap;
 use std::io;
@@ -15,7 +15,7 @@ use std::path::Path;
 /// Name of the log in an experiment's folder.
 const NAME: &str = "trials.jsonl";
 
-impl Record for TrialRecord {
+impl JournalRecord for TrialRecord {
     const NAME: &'static str = "record of a trial";
 
     fn write(&self) -> io::Result<String> {
@@ -28,13 +28,13 @@ impl Record for TrialRecord {
 }
 
 /// Records by labels and fingerprint of the trial.
-type Records = HashMap<(Vec<String>, String), TrialRecord>;
+type TrialRecords = HashMap<(Vec<String>, String), TrialRecord>;
 
 /// A log that is open for writing, in a folder that only this process writes into.
 #[derive(Debug)]
 pub struct TrialLog {
     file: Journal<TrialRecord>,
-    records: Records,
+    records: TrialRecords,
     /// Claimed while the log is open.
     _folder: OutputFolder,
 }
@@ -46,7 +46,7 @@ impl TrialLog {
     /// A file that cannot be read or written, is a link, or is not a log. It stays unchanged.
     pub fn open(folder: OutputFolder) -> Result<Self, JournalError> {
         let (file, records) = Journal::open(&folder.path().join(NAME), "")?;
-        Ok(Self { file, records: records.into_iter().map(keyed).collect(), _folder: folder })
+        Ok(Self { file, records: records.into_iter().map(record_with_key).collect(), _folder: folder })
     }
 
     /// Adds the trials that shards of the experiment have finished and this log does not contain.
@@ -55,8 +55,8 @@ impl TrialLog {
     /// If the log of a shard cannot be read or is invalid, or if this log cannot be written.
     pub fn take_over_shards(&mut self) -> Result<(), JournalError> {
         let output = self.file.path().parent().map(Path::to_owned).unwrap_or_default();
-        for folder in folders(&output) {
-            let records: Records = read(&folder.join(NAME))?.into_iter().map(keyed).collect();
+        for folder in shard_folders(&output) {
+            let records: TrialRecords = read(&folder.join(NAME))?.into_iter().map(record_with_key).collect();
             let mut records: Vec<_> = records.into_iter().collect();
             records.sort_by(|a, b| a.0.cmp(&b.0));
             for (key, record) in records {
@@ -69,7 +69,7 @@ impl TrialLog {
     }
 
     /// Returns the record of a trial, if it is finished.
-    pub fn find(&self, trial: &Trial) -> Option<&TrialRecord> {
+    pub fn record_of(&self, trial: &Trial) -> Option<&TrialRecord> {
         self.records.get(&(trial.labels.clone(), trial.fingerprint()))
     }
 
@@ -85,12 +85,12 @@ impl TrialLog {
     pub fn append(&mut self, record: TrialRecord) -> Result<(), JournalError> {
         let done = self.file.append(&record).and_then(|_| self.file.sync());
         done.map_err(|source| JournalError::Io { path: self.file.path().to_owned(), source })?;
-        self.records.extend([keyed(record)]);
+        self.records.extend([record_with_key(record)]);
         Ok(())
     }
 }
 
-fn keyed(record: TrialRecord) -> ((Vec<String>, String), TrialRecord) {
+fn record_with_key(record: TrialRecord) -> ((Vec<String>, String), TrialRecord) {
     ((record.labels.clone(), record.fingerprint.clone()), record)
 }
 

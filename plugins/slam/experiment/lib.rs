@@ -34,11 +34,11 @@ pub mod schema;
 mod summary;
 mod trial;
 
-pub use document::{Documents, Experiment, NoShard, Shard, SummarySettings};
+pub use document::{Experiment, ExperimentSources, Shard, ShardError, SummarySettings};
 pub use journal::TrialLog;
 pub use manifactor_metrics::{Interval, bootstrap};
 pub use measures::measures;
 pub use output::write;
-pub use runner::{Progress, alone, run};
-pub use summary::{Comparison, Group, Summary, trials_table};
+pub use runner::{ExperimentProgress, run, run_single_threaded};
+pub use summary::{Comparison, ExperimentSummary, TrialGroup, trials_table};
 pub use trial::{Trial, TrialOutcome, TrialRecord};

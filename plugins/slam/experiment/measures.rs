@@ -2,19 +2,19 @@
 use indexmap::IndexMap;
 use manifactor_config::quoted_list;
 use manifactor_mapping::estimate::Estimate;
-use manifactor_mapping::semantics::{Rule, table_one};
+use manifactor_mapping::semantics::{SemanticRule, table_one};
 use manifactor_metrics::Alignment;
 use manifactor_quadric::DualQuadric;
-use manifactor_recording::class::Aliases;
+use manifactor_recording::class::ClassAliases;
 use manifactor_run::output::report::{TrajectoryReport, VariantReport, alignment_name};
 
 /// Name of a measure of a trajectory, and the function that computes it.
-type OfTrajectory = (&'static str, fn(&TrajectoryReport) -> Option<f64>);
+type TrajectoryMeasure = (&'static str, fn(&TrajectoryReport) -> Option<f64>);
 /// Name of a measure of a whole estimate, and the function that computes it.
-type OfEstimate = (&'static str, fn(&Estimate, &VariantReport) -> Option<f64>);
+type EstimateMeasure = (&'static str, fn(&Estimate, &VariantReport) -> Option<f64>);
 
 /// Measures under each alignment: `ate` gives `ate_se3`, `ate_sim3`, ….
-const BY_ALIGNMENT: [OfTrajectory; 9] = [
+const ALIGNMENT_MEASURES: [TrajectoryMeasure; 9] = [
     ("ate", |t| Some(t.estimate.ate.rmse)),
     ("odometry_ate", |t| Some(t.odometry.ate.rmse)),
     ("gain", |t| Some(1.0 - t.estimate.ate.rmse / t.odometry.ate.rmse)),
@@ -27,7 +27,7 @@ const BY_ALIGNMENT: [OfTrajectory; 9] = [
 ];
 
 /// Measures that do not depend on an alignment.
-const ONCE: [OfEstimate; 32] = [
+const ESTIMATE_MEASURES: [EstimateMeasure; 32] = [
     ("position", |_, r| Some(r.landmarks?.estimate.rmse.position)),
     ("position_mean", |_, r| Some(r.landmarks?.estimate.mean.position)),
     ("shape", |_, r| Some(r.landmarks?.estimate.mean.shape)),
@@ -58,7 +58,7 @@ const ONCE: [OfEstimate; 32] = [
     ("objects", |_, r| Some(r.counts.objects as f64)),
     ("boxes", |_, r| Some(r.counts.boxes as f64)),
     ("semantic_factors", |_, r| Some(r.counts.semantic_factors as f64)),
-    ("unsound", |e, _| Some(unsound(e) as f64)),
+    ("unsound", |e, _| Some(count_unsound_objects(e) as f64)),
     ("inactive", |_, r| Some(r.solve.inactive as f64)),
     ("initial_cost", |_, r| Some(r.solve.initial_cost)),
     ("final_cost", |_, r| Some(r.solve.final_cost)),
@@ -79,22 +79,22 @@ const ONCE: [OfEstimate; 32] = [
 ///   longest axis m; `c_horizontal` likewise.
 pub fn measures(estimate: &Estimate, report: &VariantReport) -> IndexMap<String, f64> {
     let aligned = report.trajectory.iter().flat_map(|trajectory| {
-        BY_ALIGNMENT.iter().map(|(name, of)| (aligned(name, trajectory.alignment), of(trajectory)))
+        ALIGNMENT_MEASURES.iter().map(|(name, of)| (aligned(name, trajectory.alignment), of(trajectory)))
     });
-    let once = ONCE.iter().map(|(name, of)| ((*name).to_owned(), of(estimate, report)));
+    let once = ESTIMATE_MEASURES.iter().map(|(name, of)| ((*name).to_owned(), of(estimate, report)));
     aligned.chain(once).filter_map(|(name, value)| Some((name, value.filter(|x| x.is_finite())?))).collect()
 }
 
 /// Returns the names of all measures under these alignments.
 pub(crate) fn measure_names(alignments: &[Alignment]) -> Vec<String> {
-    let by = alignments.iter().flat_map(|by| BY_ALIGNMENT.iter().map(|(name, _)| aligned(name, *by)));
-    by.chain(ONCE.iter().map(|(name, _)| (*name).to_owned())).collect()
+    let by = alignments.iter().flat_map(|by| ALIGNMENT_MEASURES.iter().map(|(name, _)| aligned(name, *by)));
+    by.chain(ESTIMATE_MEASURES.iter().map(|(name, _)| (*name).to_owned())).collect()
 }
 
 /// Returns all names in words; `*` stands for an alignment.
 pub(super) fn measure_names_in_words() -> String {
-    let stems = BY_ALIGNMENT.map(|(name, _)| format!("`{name}_*`")).join(", ");
-    let once = ONCE.map(|(name, _)| format!("`{name}`")).join(", ");
+    let stems = ALIGNMENT_MEASURES.map(|(name, _)| format!("`{name}_*`")).join(", ");
+    let once = ESTIMATE_MEASURES.map(|(name, _)| format!("`{name}`")).join(", ");
     let alignments = quoted_list(&Alignment::ALL.map(alignment_name));
     format!("{stems}, where `*` is an alignment of the run ({alignments}), {once}")
 }
@@ -104,7 +104,7 @@ fn aligned(name: &str, alignment: Alignment) -> String {
 }
 
 /// Returns the number of objects with a semi-axis that is not positive, or with a number that is not finite.
-fn unsound(estimate: &Estimate) -> usize {
+fn count_unsound_objects(estimate: &Estimate) -> usize {
     let sound = |q: &DualQuadric| {
         let numbers = q.semi_axes.iter().chain(q.pose.translation.iter());
         numbers.copied().all(f64::is_finite) && q.semi_axes.min() > 0.0
@@ -115,13 +115,14 @@ fn unsound(estimate: &Estimate) -> usize {
 /// Returns the mean of |m · up| over mapped objects of classes that have this factor in Table I.
 fn mean_alignment(estimate: &Estimate, factor: &str) -> Option<f64> {
     let up = estimate.mapping.frame.up?;
-    let (rules, aliases) = (table_one().ok()?, Aliases::default());
+    let (rules, aliases) = (table_one().ok()?, ClassAliases::default());
     let applies = |class: &str| {
-        let applies = |rule: &Rule| rule.factor.name() == factor && rule.applies(class, &aliases);
+        let applies =
+            |rule: &SemanticRule| rule.factor.factor_type() == factor && rule.applies(class, &aliases);
         rules.iter().any(applies)
     };
     let landmarks = estimate.landmarks();
-    let of_class = |l: &&manifactor_mapping::estimate::Landmark<'_>| {
+    let of_class = |l: &&manifactor_mapping::estimate::LandmarkEstimate<'_>| {
         l.object.class.as_ref().is_some_and(|c| applies(&c.name))
     };
     let cosines: Vec<f64> =
@@ -141,6 +142,6 @@ mod tests {
         assert_eq!(alignments.len(), Alignment::ALL.len(), "{schema:?}");
         let names = measure_names(&Alignment::ALL);
         assert_eq!(names.iter().collect::<HashSet<_>>().len(), names.len());
-        assert_eq!(names.len(), BY_ALIGNMENT.len() * alignments.len() + ONCE.len());
+        assert_eq!(names.len(), ALIGNMENT_MEASURES.len() * alignments.len() + ESTIMATE_MEASURES.len());
     }
 }

@@ -1,24 +1,24 @@
 //! Files that an experiment writes.
-use crate::document::{Documents, Experiment};
+use crate::document::{Experiment, ExperimentSources};
 use crate::journal::TrialLog;
-use crate::summary::{Comparison, Summary, times_table, trials_table};
+use crate::summary::{Comparison, ExperimentSummary, times_table, trials_table};
 use manifactor_config::to_toml;
 use manifactor_formats::table::{Column, Table, TableError, to_parquet};
 use manifactor_metrics::Interval;
-use manifactor_run::output::{OutputError, results, write_document, write_whole};
+use manifactor_run::output::{OutputError, format_results, write_document, write_whole};
 use std::fmt;
 
 /// Writes all tables and returns the summary.
 ///
 /// # Errors
 /// If a file cannot be written; files written before it remain.
-pub fn write(experiment: &Experiment, journal: &TrialLog) -> Result<Summary, OutputError> {
+pub fn write(experiment: &Experiment, journal: &TrialLog) -> Result<ExperimentSummary, OutputError> {
     let file = |name: &str| experiment.output.join(name);
     let write = |name: &str, content: Result<Vec<u8>, TableError>| {
         let content = content.map_err(|source| OutputError::Table { path: file(name), source })?;
         write_whole(&file(name), content)
     };
-    let Documents { experiment: own, base } = &experiment.documents;
+    let ExperimentSources { experiment: own, base } = &experiment.documents;
     // in a separate folder, because the results may already be beside files with these names
     write_document(&file("repeat/experiment.toml"), to_toml(own))?;
     write_document(&file("repeat/base.toml"), to_toml(base))?;
@@ -27,14 +27,14 @@ pub fn write(experiment: &Experiment, journal: &TrialLog) -> Result<Summary, Out
     write("trials.csv", csv(&trials))?;
     write("trials.parquet", to_parquet(&trials))?;
     write("times.csv", csv(&times_table(experiment, journal)))?;
-    let summary = Summary::new(experiment, journal);
+    let summary = ExperimentSummary::new(experiment, journal);
     write("summary.csv", csv(&summary.table()))?;
     write_whole(&file("summary.md"), summary.markdown())?;
-    write_document(&file("summary.json"), results(&summary))?;
+    write_document(&file("summary.json"), format_results(&summary))?;
     Ok(summary)
 }
 
-impl Summary {
+impl ExperimentSummary {
     /// Returns a row for each group and metric.
     pub fn table(&self) -> Table {
         let mut table = Table::default();

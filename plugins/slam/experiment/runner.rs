@@ -3,7 +3,7 @@ use crate::document::Experiment;
 use crate::journal::TrialLog;
 use crate::trial::{Trial, TrialOutcome, TrialRecord};
 use manifactor_formats::journal::JournalError;
-use manifactor_recording::source::Folders;
+use manifactor_recording::source::InputFolders;
 use manifactor_solve::{Interrupt, Observer};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,7 +11,7 @@ use std::sync::mpsc;
 
 /// Progress of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Progress {
+pub struct ExperimentProgress {
     /// Finished trials, including those of earlier runs.
     pub done: usize,
     /// Finished trials of earlier runs.
@@ -27,17 +27,18 @@ pub struct Progress {
 /// If the log cannot be written. An error within a trial becomes its outcome.
 pub fn run(
     experiment: &Experiment,
-    folders: &Folders,
+    folders: &InputFolders,
     journal: &mut TrialLog,
     threads: usize,
     interrupt: &Interrupt,
-    mut progress: impl FnMut(Progress),
+    mut progress: impl FnMut(ExperimentProgress),
 ) -> Result<bool, JournalError> {
     let (trials, next) = (experiment.trials.len(), AtomicUsize::new(0));
-    let open: Vec<&Trial> = experiment.trials.iter().filter(|trial| journal.find(trial).is_none()).collect();
+    let open: Vec<&Trial> =
+        experiment.trials.iter().filter(|trial| journal.record_of(trial).is_none()).collect();
     let kept = trials - open.len();
     let mut done = kept;
-    progress(Progress { done, kept, trials });
+    progress(ExperimentProgress { done, kept, trials });
     let (send, receive) = mpsc::channel();
     let written = std::thread::scope(|scope| {
         for _ in 0..threads.clamp(1, open.len().max(1)) {
@@ -45,7 +46,7 @@ pub fn run(
             scope.spawn(move || {
                 while !interrupt.0.load(Ordering::Relaxed)
                     && let Some(trial) = open.get(next.fetch_add(1, Ordering::Relaxed))
-                    && let Some(record) = alone(trial, folders, &mut interrupt.clone())
+                    && let Some(record) = run_single_threaded(trial, folders, &mut interrupt.clone())
                     && send.send(record).is_ok()
                 {}
             });
@@ -57,7 +58,7 @@ pub fn run(
             tracing::info!(trial, status, seconds = record.seconds, "trial");
             journal.append(record)?;
             done += 1;
-            progress(Progress { done, kept, trials });
+            progress(ExperimentProgress { done, kept, trials });
         }
         Ok(())
     });
@@ -65,7 +66,11 @@ pub fn run(
 }
 
 /// Runs a trial on one thread: its solver has a pool of one thread. `None` if the observer stopped it.
-pub fn alone(trial: &Trial, folders: &Folders, observer: &mut (dyn Observer + Send)) -> Option<TrialRecord> {
+pub fn run_single_threaded(
+    trial: &Trial,
+    folders: &InputFolders,
+    observer: &mut (dyn Observer + Send),
+) -> Option<TrialRecord> {
     let failed = |reason: String| TrialRecord {
         labels: trial.labels.clone(),
         fingerprint: trial.fingerprint(),

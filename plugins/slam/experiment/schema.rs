@@ -2,15 +2,15 @@
 use crate::document::ExperimentDocument;
 use manifactor_config::{Definitions, graph_root};
 use manifactor_mapping::semantics::{RulesDocument, SemanticsDocument};
-use manifactor_mapping::settings::Settings;
-use manifactor_mapping::settings::run_document::Header;
+use manifactor_mapping::settings::RunSettings;
+use manifactor_mapping::settings::run_document::RunHeader;
 use serde_json::{Value, json};
 
 /// The schema of a [`RunDocument`](manifactor_mapping::settings::run_document::RunDocument), with everything registered that it can name; its
 /// definitions are put among the others.
 pub fn run_root(definitions: &mut Definitions) -> Value {
-    let mut root = definitions.of::<Settings>();
-    let mut header = definitions.of::<Header>();
+    let mut root = definitions.of::<RunSettings>();
+    let mut header = definitions.of::<RunHeader>();
     let mut literal = graph_root(definitions);
     let mut own = json!({ "semantics": definitions.of::<SemanticsDocument>() });
     own["semantics"]["description"] =

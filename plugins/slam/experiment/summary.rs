@@ -15,7 +15,7 @@ pub use table::trials_table;
 
 /// Means and comparisons of all groups.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Summary {
+pub struct ExperimentSummary {
     /// Title of the experiment.
     pub title: String,
     /// Columns that distinguish groups; the compared column is the last.
@@ -26,14 +26,14 @@ pub struct Summary {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub across: Option<String>,
     /// Groups in the order of the table.
-    pub groups: Vec<Group>,
+    pub groups: Vec<TrialGroup>,
     /// Number of trials that are not finished.
     pub open: usize,
 }
 
 /// Trials with equal values in the columns that distinguish groups.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Group {
+pub struct TrialGroup {
     /// Labels, by column of the summary.
     pub labels: Vec<String>,
     /// Number of finished trials.
@@ -66,7 +66,7 @@ impl Comparison {
     }
 }
 
-impl Summary {
+impl ExperimentSummary {
     /// Summarizes the finished trials.
     pub fn new(experiment: &Experiment, journal: &TrialLog) -> Self {
         let settings = &experiment.summary;
@@ -77,7 +77,7 @@ impl Summary {
         let mut by: Vec<usize> = settings.by.iter().filter_map(place).collect();
         by.extend(compared.map(|(column, _)| column).filter(|column| !by.contains(column)));
         let clusters: Vec<usize> = settings.clusters.iter().filter_map(place).collect();
-        let over = Over { records: &records, by: &by, compared, clusters: &clusters, settings };
+        let over = SummaryBuilder { records: &records, by: &by, compared, clusters: &clusters, settings };
 
         let keys: IndexSet<Vec<&str>> = records.iter().map(|record| labels(record, &by)).collect();
         Self {
@@ -96,7 +96,7 @@ fn labels<'a>(record: &'a TrialRecord, columns: &[usize]) -> Vec<&'a str> {
     columns.iter().map(|i| record.labels.get(*i).map_or("", String::as_str)).collect()
 }
 
-struct Over<'a> {
+struct SummaryBuilder<'a> {
     records: &'a [&'a TrialRecord],
     by: &'a [usize],
     /// The compared column, and the value of the baseline.
@@ -105,8 +105,8 @@ struct Over<'a> {
     settings: &'a SummarySettings,
 }
 
-impl<'a> Over<'a> {
-    fn group(&self, key: &[&str]) -> Group {
+impl<'a> SummaryBuilder<'a> {
+    fn group(&self, key: &[&str]) -> TrialGroup {
         let members: Vec<&TrialRecord> =
             self.records.iter().copied().filter(|record| labels(record, self.by) == key).collect();
         let count = |status: fn(&str) -> bool| members.iter().filter(|r| status(r.outcome.status())).count();
@@ -116,7 +116,7 @@ impl<'a> Over<'a> {
         let metrics = || self.settings.metrics.iter();
         let mean = |metric: &String| Some((metric.clone(), self.mean(&members, metric)?));
         let compare = |metric: &String| Some((metric.clone(), self.compare(&members, metric)?));
-        Group {
+        TrialGroup {
             labels: key.iter().map(|label| (*label).to_owned()).collect(),
             trials: members.len(),
             failed: count(|status| status == "failed"),
@@ -127,7 +127,8 @@ impl<'a> Over<'a> {
     }
 
     fn mean(&self, members: &[&'a TrialRecord], metric: &str) -> Option<Interval> {
-        let values = members.iter().filter_map(|record| Some((*record, record.outcome.measure(metric)?)));
+        let values =
+            members.iter().filter_map(|record| Some((*record, record.outcome.measure_by_name(metric)?)));
         self.interval(values)
     }
 
@@ -142,8 +143,8 @@ impl<'a> Over<'a> {
         let pairs: Vec<(&TrialRecord, f64, f64)> = members
             .iter()
             .filter_map(|record| {
-                let baseline = all.get(&key(record, value))?.outcome.measure(metric)?;
-                Some((*record, record.outcome.measure(metric)?, baseline))
+                let baseline = all.get(&key(record, value))?.outcome.measure_by_name(metric)?;
+                Some((*record, record.outcome.measure_by_name(metric)?, baseline))
             })
             .collect();
         let difference =

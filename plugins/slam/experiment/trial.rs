@@ -1,8 +1,8 @@
 //! A trial and its outcome.
 use crate::measures::measures;
 use indexmap::IndexMap;
-use manifactor_mapping::settings::Settings;
-use manifactor_recording::source::Folders;
+use manifactor_mapping::settings::RunSettings;
+use manifactor_recording::source::InputFolders;
 use manifactor_run::run::{RunError, estimate};
 use manifactor_solve::{Observer, Termination};
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ pub struct Trial {
     /// Labels, by column of the experiment.
     pub labels: Vec<String>,
     /// Complete settings.
-    pub settings: Settings,
+    pub settings: RunSettings,
 }
 
 /// Outcome of a trial.
@@ -50,13 +50,13 @@ pub struct TrialRecord {
 }
 
 impl Trial {
-    /// Returns the fingerprint of its [settings](Settings::fingerprint).
+    /// Returns the fingerprint of its [settings](RunSettings::fingerprint).
     pub fn fingerprint(&self) -> String {
         self.settings.fingerprint()
     }
 
     /// Runs the trial; `None` if the observer stopped it. Errors become the outcome.
-    pub fn run(&self, folders: &Folders, observer: &mut dyn Observer) -> Option<TrialRecord> {
+    pub fn run(&self, folders: &InputFolders, observer: &mut dyn Observer) -> Option<TrialRecord> {
         let clock = Instant::now();
         let outcome = match self.solve(folders, observer) {
             Ok(outcome) => outcome?,
@@ -68,7 +68,7 @@ impl Trial {
 
     fn solve(
         &self,
-        folders: &Folders,
+        folders: &InputFolders,
         observer: &mut dyn Observer,
     ) -> Result<Option<TrialOutcome>, RunError> {
         let sequence = Arc::new(self.settings.source.load(folders)?);

@@ -4,9 +4,9 @@ pub mod refine;
 pub mod variance;
 
 use crate::estimate::refine::Refiner;
-use crate::estimate::variance::{Components, VarianceError, VarianceSettings};
+use crate::estimate::variance::{VarianceComponents, VarianceError, VarianceSettings};
 use crate::mapping::{MappedObject, Mapping, pose_key};
-use crate::settings::Settings;
+use crate::settings::RunSettings;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Values};
@@ -30,7 +30,7 @@ pub struct Estimate {
     /// Time for the refinement of single objects, in seconds.
     pub refinement_seconds: f64,
     /// The estimated noise of each round; empty if the noise is given.
-    pub components: Vec<Components>,
+    pub components: Vec<VarianceComponents>,
 }
 
 /// Reason why there is no estimate.
@@ -47,7 +47,7 @@ pub enum EstimateError {
 
 /// Returns the graph with the semi-axes of all objects with orientation factors fixed; `None` if no object
 /// has such a factor.
-fn with_shapes_held(mapping: &Mapping) -> Option<Graph> {
+fn with_fixed_shapes(mapping: &Mapping) -> Option<Graph> {
     let mut graph = mapping.graph.clone();
     let mut oriented = mapping.mapped().filter(|object| !object.semantic_factors.is_empty()).peekable();
     oriented.peek()?;
@@ -59,7 +59,7 @@ fn with_shapes_held(mapping: &Mapping) -> Option<Graph> {
 
 /// Accumulates several solves, reported as one.
 #[derive(Debug, Default)]
-struct Rounds {
+struct SolveRounds {
     iterations: usize,
     times: Times,
     history: Vec<IterationRecord>,
@@ -69,7 +69,7 @@ struct Rounds {
     cost: Option<f64>,
 }
 
-impl Rounds {
+impl SolveRounds {
     fn refine(&mut self, refiner: &Refiner<'_>, values: &mut Values) {
         let clock = Instant::now();
         refiner.refine(values);
@@ -80,7 +80,7 @@ impl Rounds {
         &mut self,
         graph: &Graph,
         values: &Values,
-        settings: &Settings,
+        settings: &RunSettings,
         observer: &mut dyn Observer,
     ) -> Result<Solution, CompileError> {
         let solution = solve(graph, values, &*settings.solver, observer)?;
@@ -97,12 +97,12 @@ impl Rounds {
     }
 
     /// Called after a joint solve. Returns whether no further round is needed.
-    fn settled(&mut self, outcome: &Outcome) -> bool {
+    fn record_joint_solve(&mut self, outcome: &Outcome) -> bool {
         self.joint += 1;
         let cost = outcome.final_cost;
         let before = self.cost.replace(cost).unwrap_or(f64::INFINITY);
         // a NaN ends the rounds too
-        let falls = before - cost > SETTLED * before || before == f64::INFINITY;
+        let falls = before - cost > MIN_RELATIVE_DECREASE * before || before == f64::INFINITY;
         outcome.termination == Termination::Interrupted || !(falls && cost.is_finite())
     }
 
@@ -115,7 +115,7 @@ impl Rounds {
 
 /// An object of the map with its estimate.
 #[derive(Debug, Clone, Copy)]
-pub struct Landmark<'a> {
+pub struct LandmarkEstimate<'a> {
     /// The object and its measurements.
     pub object: &'a MappedObject,
     /// The estimated ellipsoid, in the map frame.
@@ -125,7 +125,7 @@ pub struct Landmark<'a> {
 }
 
 /// The rounds end when one lowers the cost by less than this share.
-const SETTLED: f64 = 1e-3;
+const MIN_RELATIVE_DECREASE: f64 = 1e-3;
 
 impl Estimate {
     /// Solves the graph of a sequence. With [`variance`] components, alternates between estimating the noise
@@ -136,7 +136,7 @@ impl Estimate {
     pub fn new(
         sequence: Arc<Sequence>,
         mapping: Mapping,
-        settings: &Settings,
+        settings: &RunSettings,
         observer: &mut dyn Observer,
     ) -> Result<Self, EstimateError> {
         let start = mapping.values.clone();
@@ -148,15 +148,15 @@ impl Estimate {
         sequence: Arc<Sequence>,
         mut mapping: Mapping,
         start: Values,
-        settings: &Settings,
+        settings: &RunSettings,
         observer: &mut dyn Observer,
     ) -> Result<Self, EstimateError> {
         let (most, loss) = (settings.objects.refinements, settings.detections.loss.as_ref());
         let Some(variance) = &settings.variance_components else {
             return Ok(Self::solve(sequence, mapping, start, most, settings, observer)?);
         };
-        let begin = Components::begin(&mapping, variance);
-        begin.apply(&mut mapping, variance, loss)?;
+        let begin = VarianceComponents::initial(&mapping, variance);
+        begin.apply_to_graph(&mut mapping, variance, loss)?;
         let estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
         estimate.with_noise(variance, settings, observer)
     }
@@ -165,22 +165,25 @@ impl Estimate {
     fn with_noise(
         mut self,
         variance: &VarianceSettings,
-        settings: &Settings,
+        settings: &RunSettings,
         observer: &mut dyn Observer,
     ) -> Result<Self, EstimateError> {
         let (most, loss) = (settings.objects.refinements, settings.detections.loss.as_ref());
         let (mut rounds, mut settled) = (0, false);
         let interrupted = |of: &Self| of.solution.outcome.termination == Termination::Interrupted;
         while !(settled || interrupted(&self) || self.mapping.mapped().next().is_none()) {
-            let found = Components::of(&self, variance, loss, observer)?;
+            let found = VarianceComponents::estimate_from(&self, variance, loss, observer)?;
             rounds += 1;
             settled = rounds >= variance.rounds.get()
-                || self.components.last().is_some_and(|before| found.change(before) < *variance.tolerance);
+                || self
+                    .components
+                    .last()
+                    .is_some_and(|before| found.largest_change(before) < *variance.tolerance);
             let Self { sequence, mut mapping, mut solution, mut components, .. } = self;
             let values = std::mem::take(&mut solution.values);
             // free the compiled problem before the next solve
             drop(solution);
-            found.apply(&mut mapping, variance, loss)?;
+            found.apply_to_graph(&mut mapping, variance, loss)?;
             components.push(found);
             // refine only before the last solve: an approximate solution suffices until then
             let refinements = if settled { most } else { 0 };
@@ -204,18 +207,18 @@ impl Estimate {
         mapping: Mapping,
         mut values: Values,
         most: usize,
-        settings: &Settings,
+        settings: &RunSettings,
         observer: &mut dyn Observer,
     ) -> Result<Self, CompileError> {
-        let (refiner, held) = (Refiner::new(&mapping), with_shapes_held(&mapping));
+        let (refiner, held) = (Refiner::new(&mapping), with_fixed_shapes(&mapping));
         let initial_cost = Problem::compile(&mapping.graph, &values)?.linearize().cost;
-        let mut rounds = Rounds::default();
+        let mut rounds = SolveRounds::default();
         loop {
             if most > 0 {
                 rounds.refine(&refiner, &mut values);
             }
             let mut joint = rounds.solve(&mapping.graph, &values, settings, observer)?;
-            let settled = rounds.settled(&joint.outcome) || rounds.joint >= most;
+            let settled = rounds.record_joint_solve(&joint.outcome) || rounds.joint >= most;
             if let Some(held) = held.as_ref().filter(|_| !settled) {
                 let from = std::mem::take(&mut joint.values);
                 drop(joint);
@@ -249,20 +252,20 @@ impl Estimate {
     }
 
     /// Returns the objects with their estimates.
-    pub fn landmarks(&self) -> Vec<Landmark<'_>> {
+    pub fn landmarks(&self) -> Vec<LandmarkEstimate<'_>> {
         self.landmarks_in(&self.solution.values)
     }
 
     /// Returns the objects with their initial values.
-    pub fn initial_landmarks(&self) -> Vec<Landmark<'_>> {
+    pub fn initial_landmarks(&self) -> Vec<LandmarkEstimate<'_>> {
         self.landmarks_in(&self.mapping.values)
     }
 
-    fn landmarks_in<'a>(&'a self, values: &'a Values) -> Vec<Landmark<'a>> {
+    fn landmarks_in<'a>(&'a self, values: &'a Values) -> Vec<LandmarkEstimate<'a>> {
         let truths = self.sequence.ground_truth.as_ref().map_or(&[][..], |truth| &truth.objects);
         let landmark = |object: &'a MappedObject| {
             let truth = truths.iter().find(|truth| truth.id == object.id);
-            Some(Landmark { object, quadric: values.get(&object.key).ok()?, truth })
+            Some(LandmarkEstimate { object, quadric: values.get(&object.key).ok()?, truth })
         };
         self.mapping.mapped().filter_map(landmark).collect()
     }

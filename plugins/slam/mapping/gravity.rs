@@ -11,10 +11,10 @@ mod ground_truth;
 mod source;
 mod vector;
 
-pub use accelerometer::Accelerometer;
-pub use ground_truth::GroundTruthPose;
-pub use source::FromSource;
-pub use vector::UpVector;
+pub use accelerometer::AccelerometerGravity;
+pub use ground_truth::GroundTruthGravity;
+pub use source::SourceGravity;
+pub use vector::VectorGravity;
 
 /// A method to find the up direction. Chosen by name in `[gravity]` of a run.
 #[typetag::serialize(tag = "type")]
@@ -26,7 +26,7 @@ pub trait Gravity: Debug + Send + Sync {
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError>;
 
     /// Returns the time in a stream after which new data change nothing, in seconds after the first frame.
-    fn settled_after(&self) -> f64 {
+    fn final_after_s(&self) -> f64 {
         0.0
     }
 }

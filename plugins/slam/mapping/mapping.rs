@@ -4,17 +4,17 @@
 //! Factors, in this order: the prior on the first pose; odometry between consecutive poses; for each object
 //! its boxes, then its semantic factors; last, variables and factors of the run document.
 use crate::gravity::{GravityError, MapFrame};
-use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
-use crate::motion::{MotionError, RelativePose, Step};
-use crate::semantics::{Applied, Candidate, LeftOut, RuleError, Verdict, unmatched};
-use crate::settings::{DetectionSettings, OdometrySettings, Settings};
+use crate::mapping::measurements::{Measurements, ObjectBox, ObjectMeasurements};
+use crate::motion::{MotionError, MotionStep, RelativePose};
+use crate::semantics::{AppliedRule, RuleCandidate, RuleError, RuleVerdict, SkippedRule, unmatched};
+use crate::settings::{DetectionSettings, OdometrySettings, RunSettings};
 use manifactor_formats::plausible;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::{Prior, Se3};
 use manifactor_graph::{FactorEntry, Graph, Key, Values, Variable};
 use manifactor_quadric::{BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
 use manifactor_recording::fusion::FusedClass;
-use manifactor_recording::measurement::Errors;
+use manifactor_recording::measurement::MeasurementSigmas;
 use manifactor_recording::prior_map::PriorObject;
 use manifactor_recording::sequence::{Frame, ObjectId, Sequence, UnusedDetection};
 use serde::Serialize;
@@ -26,9 +26,10 @@ pub mod rejection;
 pub mod rules;
 mod warning;
 
+use manifactor_recording::keys::key_number;
 pub use manifactor_recording::keys::{object_key, pose_key};
 pub use rejection::Rejection;
-use rules::Ledger;
+use rules::SemanticFactors;
 pub use warning::Warning;
 
 /// The graph of a sequence, and the decisions behind it.
@@ -65,10 +66,10 @@ pub struct MappedObject {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected: Option<Rejection>,
     /// Factors from semantic rules, with their reasons.
-    pub semantic_factors: Vec<Applied>,
+    pub semantic_factors: Vec<AppliedRule>,
     /// Rules for its class that were not applied, with their reasons.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<SkippedRule>,
 }
 
 /// Reason why a sequence cannot be mapped.
@@ -91,9 +92,7 @@ pub enum MappingError {
 
 /// Returns the frame of a pose key; `None` for any other key.
 pub(crate) fn frame_of(key: &Key) -> Option<usize> {
-    let number = key.as_str().strip_prefix('x')?;
-    let is_number = number.bytes().all(|b| b.is_ascii_digit());
-    is_number.then(|| number.parse().ok()).flatten()
+    key_number(key, "x")?.parse().ok()
 }
 
 impl Mapping {
@@ -101,19 +100,20 @@ impl Mapping {
     ///
     /// # Errors
     /// If there is no frame, or a rule needs the up direction and it is unknown.
-    pub fn new(sequence: &Sequence, settings: &Settings) -> Result<Self, MappingError> {
+    pub fn new(sequence: &Sequence, settings: &RunSettings) -> Result<Self, MappingError> {
         let first = sequence.frames.first().ok_or(MappingError::NoFrames)?;
         let located = settings.gravity.locate(sequence)?;
-        let frame = settings.anchor().map_or(located, |anchor| anchor.frame(first, located));
+        let frame = settings.anchor().map_or(located, |anchor| anchor.map_frame(first, located));
         let measurements = Measurements::gather(sequence, settings);
         let at = |i: usize| {
             let seen = sequence.frames.get(i)?;
             let pose = frame.map_from_odometry.compose(&seen.world_from_camera);
             Some(StampedPose { timestamp: seen.timestamp, pose })
         };
-        let start = |measured| rejection::start(measured, at, sequence.camera, settings);
+        let start = |measured| rejection::initial_quadric(measured, at, sequence.camera, settings);
         let starts = measurements.objects.iter().map(start).collect();
-        let decisions = Ledger::default().complete(&measurements, starts, settings, frame.up)?;
+        let decisions =
+            SemanticFactors::default().complete_decisions(&measurements, starts, settings, frame.up)?;
         Self::assemble(sequence, settings, frame, measurements, decisions)
     }
 
@@ -121,10 +121,10 @@ impl Mapping {
     /// objects.
     pub fn assemble(
         sequence: &Sequence,
-        settings: &Settings,
+        settings: &RunSettings,
         frame: MapFrame,
         measurements: Measurements,
-        decisions: Vec<Decision>,
+        decisions: Vec<ObjectDecision>,
     ) -> Result<Self, MappingError> {
         let (graph, values) = (Graph::new(), Values::new());
         let (objects, warnings) = (vec![], vec![]);
@@ -136,7 +136,7 @@ impl Mapping {
             mapping.objects.push(object);
         }
         settings.own.add_to(&mut mapping.graph, &mut mapping.values);
-        mapping.warn(sequence, settings);
+        mapping.add_warnings(sequence, settings);
         let (poses, objects, factors) =
             (sequence.frames.len(), mapping.mapped().count(), mapping.graph.factors().len());
         tracing::info!(poses, objects, factors, "mapped");
@@ -148,7 +148,7 @@ impl Mapping {
         self.objects.iter().filter(|object| object.rejected.is_none())
     }
 
-    fn add_poses(&mut self, sequence: &Sequence, settings: &Settings) -> Result<(), MappingError> {
+    fn add_poses(&mut self, sequence: &Sequence, settings: &RunSettings) -> Result<(), MappingError> {
         for (i, frame) in sequence.frames.iter().enumerate() {
             let pose = self.frame.map_from_odometry.compose(&frame.world_from_camera);
             self.values.insert(pose_key(i), pose);
@@ -158,7 +158,7 @@ impl Mapping {
         for (i, pair) in sequence.frames.windows(2).enumerate() {
             let [from, to] = pair else { continue };
             let estimates = |key: &str| self.values.variable(key).map(|value| value.erased().clone_box());
-            let step = step([i, i + 1], [from, to], &settings.odometry, &estimates);
+            let step = motion_step([i, i + 1], [from, to], &settings.odometry, &estimates);
             let factors = settings.motion.factors(&step)?;
             if let (Ok(a), Ok(b)) = (self.values.get(pose_key(i)), self.values.get(pose_key(i + 1))) {
                 let variables = settings.motion.variables(&step, [a, b]);
@@ -173,17 +173,17 @@ impl Mapping {
 
     fn add_object(
         &mut self,
-        measured: &Measured,
-        decision: Decision,
+        measured: &ObjectMeasurements,
+        decision: ObjectDecision,
         camera: Camera,
-        settings: &Settings,
+        settings: &RunSettings,
     ) -> MappedObject {
         let key = object_key(measured.id);
-        let Decision { start, verdict } = decision;
+        let ObjectDecision { start, verdict } = decision;
         match &start {
             Err(rejection) => tracing::info!(object = %measured.id, "not mapped: {rejection}"),
             Ok(start) => {
-                let known = measured.prior.as_ref().map(|known| known_entry(known, settings));
+                let known = measured.prior.as_ref().map(|known| prior_object_entry(known, settings));
                 self.graph.factors_mut().extend(known);
                 let boxes = measured.views.iter();
                 let boxes = boxes.flat_map(|view| view_entries(view, &key, camera, &settings.detections));
@@ -204,34 +204,36 @@ impl Mapping {
         }
     }
 
-    fn warn(&mut self, sequence: &Sequence, settings: &Settings) {
+    fn add_warnings(&mut self, sequence: &Sequence, settings: &RunSettings) {
         let odometry = sequence.frames.iter().map(|frame| (frame.timestamp, frame.world_from_camera));
-        let doubts = plausible::trajectory(odometry).into_iter().map(|what| Warning::Implausible { what });
+        let doubts =
+            plausible::trajectory_doubts(odometry).into_iter().map(|what| Warning::Implausible { what });
         self.warnings.extend(doubts);
-        self.warnings.extend(unused(sequence, self.measurements.without_area));
+        self.warnings.extend(unused_warnings(sequence, self.measurements.without_area));
         let detected = self.objects.iter().filter(|object| object.detections > 0);
-        self.warnings
-            .extend(not_mapped(detected.filter_map(|object| Some((object, object.rejected.as_ref()?)))));
+        self.warnings.extend(not_mapped_warnings(
+            detected.filter_map(|object| Some((object, object.rejected.as_ref()?))),
+        ));
         let classes = self.objects.iter().filter_map(|object| Some(object.class.as_ref()?.name.clone()));
         let mut seen: Vec<String> = classes.collect();
         seen.sort();
         seen.dedup();
         for rule in settings.semantics.iter().filter(|rule| !rule.shipped) {
             for class in unmatched(rule, &seen, &settings.aliases) {
-                let (class, factor) = (class.to_owned(), rule.factor.name().to_owned());
+                let (class, factor) = (class.to_owned(), rule.factor.factor_type().to_owned());
                 self.warnings.push(Warning::ClassWithoutObjects { class, factor, seen: seen.clone() });
             }
         }
         if self.mapped().next().is_none() {
             self.warnings.push(Warning::NoObjects { detected: self.objects.len() });
-        } else if !settings.association.uses_names() && settings.detections.loss.is_none() {
+        } else if !settings.association.uses_source_ids() && settings.detections.loss.is_none() {
             self.warnings.push(Warning::NotRobust);
         }
     }
 }
 
 /// Returns warnings about unused detections, one per reason.
-fn unused(sequence: &Sequence, without_area: usize) -> Vec<Warning> {
+fn unused_warnings(sequence: &Sequence, without_area: usize) -> Vec<Warning> {
     let mut warnings = vec![];
     let (mut boxes, mut first) = (0, None);
     for unused in &sequence.unused {
@@ -262,8 +264,8 @@ fn unused(sequence: &Sequence, without_area: usize) -> Vec<Warning> {
 }
 
 /// Returns warnings about objects that are not mapped, one per kind of reason.
-fn not_mapped<'a>(objects: impl Iterator<Item = (&'a MappedObject, &'a Rejection)>) -> Vec<Warning> {
-    const NAMED: usize = 5;
+fn not_mapped_warnings<'a>(objects: impl Iterator<Item = (&'a MappedObject, &'a Rejection)>) -> Vec<Warning> {
+    const MAX_LISTED_OBJECTS: usize = 5;
     let mut kinds: Vec<(&Rejection, Vec<String>)> = vec![];
     for (object, rejection) in objects {
         let class = object.class.as_ref().map(|class| format!(" ({})", class.name)).unwrap_or_default();
@@ -277,11 +279,11 @@ fn not_mapped<'a>(objects: impl Iterator<Item = (&'a MappedObject, &'a Rejection
         }
     }
     let warning = |(rejection, keys): (&Rejection, Vec<String>)| {
-        let more = match keys.len().saturating_sub(NAMED) {
+        let more = match keys.len().saturating_sub(MAX_LISTED_OBJECTS) {
             0 => String::new(),
             more => format!(" and {more} more"),
         };
-        let named = keys.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let named = keys.iter().take(MAX_LISTED_OBJECTS).map(String::as_str).collect::<Vec<_>>().join(", ");
         let what = format!("{named}{more}: {rejection}");
         Warning::NotMapped { what, remedy: rejection.remedy() }
     };
@@ -290,21 +292,21 @@ fn not_mapped<'a>(objects: impl Iterator<Item = (&'a MappedObject, &'a Rejection
 
 /// The decision about an object.
 #[derive(Debug, Clone)]
-pub struct Decision {
+pub struct ObjectDecision {
     /// Initial value, or the reason why the object is not mapped.
     pub start: Result<DualQuadric, Rejection>,
     /// Result of the semantic rules; empty if the object is not mapped.
-    pub verdict: Verdict,
+    pub verdict: RuleVerdict,
 }
 
 /// Returns a mapped object as a candidate for semantic rules.
-pub fn as_candidate(measured: &Measured, start: DualQuadric) -> Candidate {
+pub fn as_candidate(measured: &ObjectMeasurements, start: DualQuadric) -> RuleCandidate {
     let (key, class, known) = (object_key(measured.id), measured.class(), measured.prior.is_some());
-    Candidate { key, class, start, known }
+    RuleCandidate { key, class, start, known }
 }
 
 /// Returns the prior on the first pose.
-pub fn prior_entry(value: Se3, settings: &Settings) -> FactorEntry {
+pub fn prior_entry(value: Se3, settings: &RunSettings) -> FactorEntry {
     FactorEntry {
         keys: vec![pose_key(0)],
         name: None,
@@ -315,9 +317,9 @@ pub fn prior_entry(value: Se3, settings: &Settings) -> FactorEntry {
 }
 
 /// Returns the prior on an object of the prior map, with the noise of the `[prior_map]` settings.
-pub fn known_entry(object: &PriorObject, settings: &Settings) -> FactorEntry {
+pub fn prior_object_entry(object: &PriorObject, settings: &RunSettings) -> FactorEntry {
     let prior_map = settings.prior_map.as_ref();
-    let noise = prior_map.and_then(|prior| prior.trusted(object).noise().ok());
+    let noise = prior_map.and_then(|prior| prior.inflated_object(object).noise().ok());
     FactorEntry {
         keys: vec![object_key(object.id)],
         name: None,
@@ -329,15 +331,15 @@ pub fn known_entry(object: &PriorObject, settings: &Settings) -> FactorEntry {
 }
 
 /// Returns the step between two frames for a motion model.
-pub fn step<'a>(
+pub fn motion_step<'a>(
     frames: [usize; 2],
     [from, to]: [&Frame; 2],
     settings: &'a OdometrySettings,
     estimates: &'a dyn Fn(&str) -> Option<Box<dyn Variable>>,
-) -> Step<'a> {
+) -> MotionStep<'a> {
     let pose = from.world_from_camera.between(&to.world_from_camera);
     let odometry = RelativePose { pose, noise: &settings.noise, loss: settings.loss.as_ref() };
-    Step { frames, seconds: to.timestamp - from.timestamp, odometry, estimates }
+    MotionStep { frames, seconds: to.timestamp - from.timestamp, odometry, estimates }
 }
 
 /// Returns the factors of a detection: the box factor, then the factors of its further measurements.
@@ -347,7 +349,7 @@ pub fn view_entries<'a>(
     camera: Camera,
     settings: &'a DetectionSettings,
 ) -> impl Iterator<Item = FactorEntry> + 'a {
-    let errors = Errors { depth: *settings.depth_error };
+    let errors = MeasurementSigmas { depth: *settings.depth_error };
     let others = view.quantities.entries(view.frame, object, errors, settings.loss.as_ref());
     std::iter::once(box_entry(view, object.clone(), camera, settings)).chain(others)
 }

@@ -1,6 +1,6 @@
 //! Motion models: factors and variables between consecutive frames.
 //!
-//! A model gets one [`Step`] at a time, with the odometry and the estimates so far. Batch and stream use
+//! A model gets one [`MotionStep`] at a time, with the odometry and the estimates so far. Batch and stream use
 //! models in the same way: neither depends on the variables of a frame besides its pose.
 use manifactor_geometry::Se3;
 use manifactor_graph::loss::Loss;
@@ -11,19 +11,19 @@ use std::sync::Arc;
 mod constant_velocity;
 mod odometry;
 
-pub use constant_velocity::ConstantVelocity;
+pub use constant_velocity::ConstantVelocityMotion;
 pub use manifactor_recording::keys::pose_key;
-pub use odometry::Odometry;
+pub use odometry::OdometryMotion;
 
 /// A model of the motion between consecutive frames. Chosen by name in `[motion]` of a run.
 #[typetag::serialize(tag = "type")]
 pub trait MotionModel: Debug + Send + Sync {
     /// Predicts the pose of the second frame, world from camera, from the estimate `from` of the first.
-    fn predict(&self, step: &Step<'_>, from: &Se3) -> Se3;
+    fn predict(&self, step: &MotionStep<'_>, from: &Se3) -> Se3;
 
     /// Returns initial values for the variables of the second frame besides its pose; in the first step also
     /// for the first frame. `poses` are estimates of both frames, world from camera.
-    fn variables(&self, _step: &Step<'_>, _poses: [&Se3; 2]) -> Values {
+    fn variables(&self, _step: &MotionStep<'_>, _poses: [&Se3; 2]) -> Values {
         Values::new()
     }
 
@@ -31,7 +31,7 @@ pub trait MotionModel: Debug + Send + Sync {
     ///
     /// # Errors
     /// If the step has no factor, for example because its noise is not usable.
-    fn factors(&self, step: &Step<'_>) -> Result<Vec<FactorEntry>, MotionError>;
+    fn factors(&self, step: &MotionStep<'_>) -> Result<Vec<FactorEntry>, MotionError>;
 
     /// Returns the prefixes of the keys of [its variables](Self::variables): `v` for `v0`, `v1`, …
     fn prefixes(&self) -> &'static [&'static str] {
@@ -57,7 +57,7 @@ pub struct MotionError {
 
 /// The step from one frame to the next.
 #[derive(Clone, Copy)]
-pub struct Step<'a> {
+pub struct MotionStep<'a> {
     /// Indices of both frames.
     pub frames: [usize; 2],
     /// Time from the first frame to the second, in seconds; positive.
@@ -79,7 +79,7 @@ pub struct RelativePose<'a> {
     pub loss: Option<&'a Arc<dyn Loss>>,
 }
 
-impl Step<'_> {
+impl MotionStep<'_> {
     /// Returns the error of a model without a factor for this step.
     pub fn error(&self, why: &dyn fmt::Display) -> MotionError {
         let [from, to] = self.frames;
@@ -87,7 +87,7 @@ impl Step<'_> {
     }
 }
 
-impl Debug for Step<'_> {
+impl Debug for MotionStep<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { frames: [from, to], seconds, odometry, .. } = self;
         write!(f, "Step({from} to {to} in {seconds} s, {odometry:?})")

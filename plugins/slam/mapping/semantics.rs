@@ -20,7 +20,7 @@
 use manifactor_graph::checked::{Positive, Share};
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Direction, Factor, FactorEntry, Key, Noise};
-use manifactor_recording::class::Aliases;
+use manifactor_recording::class::ClassAliases;
 use manifactor_recording::fusion::FusedClass;
 use manifactor_semantic::{Component, MaxMixture};
 use schemars::JsonSchema;
@@ -34,9 +34,9 @@ mod rule_factor;
 #[cfg(test)]
 mod tests;
 
-pub use apply::{Applied, Candidate, LeftOut};
-pub(crate) use apply::{Connected, Judge, Verdict};
-pub use condition::Near;
+pub use apply::{AppliedRule, RuleCandidate, SkippedRule};
+pub(crate) use apply::{ConnectedKeys, RuleEvaluator, RuleVerdict};
+pub use condition::NearCondition;
 pub(crate) use read::read_semantics;
 pub use read::{RulesDocument, SemanticsDocument};
 pub use rule_factor::{RuleError, RuleFactor};
@@ -48,16 +48,17 @@ pub(crate) const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
 const WEAK_SHAPE: &str = include_str!("semantics/weak_shape.toml");
 
 /// Name that matches all classes.
-const ANY: &str = "*";
+const ANY_CLASS: &str = "*";
 /// Smallest share of an object's scores that makes a class an alternative.
-const LEAST_SHARE: f64 = 0.05;
+const MIN_CLASS_SHARE: f64 = 0.05;
 /// In a mixture, the alternative without a factor is as likely as a residual of this many σ.
-const DOUBT: f64 = 3.0;
+const MIXTURE_SIGMAS: f64 = 3.0;
 
 /// Objects of these classes get this factor. All rules that match an object apply to it.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Rule {
+#[schemars(rename = "Rule")]
+pub struct SemanticRule {
     /// Class names, in the spelling of any detector; `*` for all classes.
     pub classes: Vec<String>,
     /// Smallest score of the object's class, averaged over its detections.
@@ -71,7 +72,7 @@ pub struct Rule {
     pub max_size_m: Option<Positive>,
     /// Second object that has to be near.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub near: Option<Near>,
+    pub near: Option<NearCondition>,
     /// Weights the factor by the share of these classes in the object's scores: it becomes one component of a
     /// `max_mixture`, and the second component has no factor. The rule then applies to all objects that may
     /// be of these classes.
@@ -95,30 +96,30 @@ pub struct Rule {
     pub shipped: bool,
 }
 
-/// Returns whether a list of classes contains this one, a name from [`Aliases::canonical`].
-fn names(classes: &[String], class: &str, aliases: &Aliases) -> bool {
-    classes.iter().any(|name| name == ANY || aliases.canonical(name) == class)
+/// Returns whether a list of classes contains this one, a name from [`ClassAliases::canonical`].
+fn contains_class(classes: &[String], class: &str, aliases: &ClassAliases) -> bool {
+    classes.iter().any(|name| name == ANY_CLASS || aliases.canonical(name) == class)
 }
 
-impl Rule {
-    /// Returns whether objects of a class, a name from [`Aliases::canonical`], get this factor.
-    pub fn applies(&self, class: &str, aliases: &Aliases) -> bool {
-        names(&self.classes, class, aliases)
+impl SemanticRule {
+    /// Returns whether objects of a class, a name from [`ClassAliases::canonical`], get this factor.
+    pub fn applies(&self, class: &str, aliases: &ClassAliases) -> bool {
+        contains_class(&self.classes, class, aliases)
     }
 
     /// Returns the probability that the factor holds for an object of that class: 1, or in a mixture the
     /// share of these classes in the object's scores. `None` if the rule does not apply.
-    fn share(&self, class: Option<&FusedClass>, aliases: &Aliases) -> Option<f64> {
+    fn factor_probability(&self, class: Option<&FusedClass>, aliases: &ClassAliases) -> Option<f64> {
         let best = class.map_or("", |class| class.name.as_str());
         if !self.mixture || class.is_none() {
             return self.applies(best, aliases).then_some(1.0);
         }
         let shares = class.into_iter().flat_map(FusedClass::shares);
         let share: f64 = shares.filter(|(name, _)| self.applies(name, aliases)).map(|(_, share)| share).sum();
-        (share >= LEAST_SHARE).then_some(share.min(1.0))
+        (share >= MIN_CLASS_SHARE).then_some(share.min(1.0))
     }
 
-    fn class_in_words(&self, object: &Candidate, share: f64) -> String {
+    fn class_in_words(&self, object: &RuleCandidate, share: f64) -> String {
         match object.class_name() {
             name if self.mixture => format!("{:.0} % of its scores, most for {name}", 100.0 * share),
             "" => "any class".into(),
@@ -135,14 +136,14 @@ impl Rule {
     pub fn entry(&self, keys: Vec<Key>, up: Option<Direction>, share: f64) -> Result<FactorEntry, RuleError> {
         let factor = self.factor.instantiate(up)?;
         let (noise, loss) = (self.noise.clone(), self.loss.clone());
-        let nothing = (1.0 - share) * (-0.5 * DOUBT * DOUBT).exp();
+        let nothing = (1.0 - share) * (-0.5 * MIXTURE_SIGMAS * MIXTURE_SIGMAS).exp();
         match (Positive::new(share), Positive::new(nothing)) {
             (Ok(weight), Ok(nothing)) if self.mixture => {
                 let holds = Component { weight, factor: Some(factor), over: None, noise };
                 let nothing =
                     Component { weight: nothing, factor: None, over: None, noise: Noise::default() };
                 let mixture = MaxMixture::new(vec![holds, nothing]);
-                let name = || self.factor.name().to_owned();
+                let name = || self.factor.factor_type().to_owned();
                 let mixture = mixture.map_err(|source| RuleError::Mixture { factor: name(), source })?;
                 Ok(FactorEntry { keys, name: None, factor: Arc::new(mixture), noise: Noise::default(), loss })
             }
@@ -152,37 +153,39 @@ impl Rule {
 }
 
 /// Returns the text of a shipped file of rules.
-pub fn shipped(name: &str) -> Option<&'static str> {
+pub fn shipped_text(name: &str) -> Option<&'static str> {
     (name == "table_one").then_some(TABLE_ONE)
 }
 
 /// Names of the shipped files.
-pub(crate) const SHIPPED: [&str; 1] = ["table_one"];
+pub(crate) const SHIPPED_RULES: [&str; 1] = ["table_one"];
 
 /// Returns the rules of the paper's Table I.
 ///
 /// # Errors
 /// If the factors in it are not linked.
-pub fn table_one() -> Result<Vec<Rule>, manifactor_config::Diagnostics> {
+pub fn table_one() -> Result<Vec<SemanticRule>, manifactor_config::Diagnostics> {
     read::shipped_rules("table_one", TABLE_ONE)
 }
 
 /// Adds the weak `shape_prior` of streams, unless a rule has one.
-pub(crate) fn add_weak_shape(rules: &mut Vec<Rule>) {
+pub(crate) fn add_weak_shape(rules: &mut Vec<SemanticRule>) {
     // cannot fail: this crate links the factor
     let weak = read::shipped_rules("weak_shape", WEAK_SHAPE).unwrap_or_default();
-    let is_there = weak.iter().any(|weak| rules.iter().any(|rule| rule.factor.name() == weak.factor.name()));
+    let is_there = weak
+        .iter()
+        .any(|weak| rules.iter().any(|rule| rule.factor.factor_type() == weak.factor.factor_type()));
     if !is_there {
         rules.extend(weak);
     }
 }
 
 /// Returns the classes that a rule names and the data do not contain, each once.
-pub fn unmatched<'a>(rule: &'a Rule, seen: &[String], aliases: &Aliases) -> Vec<&'a str> {
+pub fn unmatched<'a>(rule: &'a SemanticRule, seen: &[String], aliases: &ClassAliases) -> Vec<&'a str> {
     let near = rule.near.iter().flat_map(|near| &near.classes);
     let mut missing: Vec<&str> = vec![];
     for name in rule.classes.iter().chain(near).map(String::as_str) {
-        if name != ANY && !seen.contains(&aliases.canonical(name)) && !missing.contains(&name) {
+        if name != ANY_CLASS && !seen.contains(&aliases.canonical(name)) && !missing.contains(&name) {
             missing.push(name);
         }
     }

@@ -1,11 +1,11 @@
 //! The settings of a run: how a sequence becomes a graph, and how the graph is solved.
-use crate::gravity::{FromSource, Gravity};
-use crate::motion::{MotionModel, Odometry};
-use crate::semantics::{Rule, add_weak_shape, read_semantics};
-use manifactor_association::{Association, Given};
+use crate::gravity::{Gravity, SourceGravity};
+use crate::motion::{MotionModel, OdometryMotion};
+use crate::semantics::{SemanticRule, add_weak_shape, read_semantics};
+use manifactor_association::{Association, GivenAssociation};
 use manifactor_config::{Diagnostics, Errors, Fault, Node, Section};
-use manifactor_recording::class::Aliases;
-use manifactor_recording::source::Source;
+use manifactor_recording::class::ClassAliases;
+use manifactor_recording::source::SequenceSource;
 use manifactor_solve::{DiagonalLimits, LevenbergMarquardt, Optimizer};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -30,19 +30,20 @@ pub use holdout::Holdout;
 pub use objects::{Degrees, ObjectSettings};
 pub use own::OwnGraph;
 pub use poses::{OdometrySettings, PriorSettings};
-pub use prior_map::Anchor;
+pub use prior_map::MapAnchor;
 pub use prior_map::PriorMapSettings;
 pub use report::ReportSettings;
 pub use variance::{BoxGroups, VarianceSettings};
 
 /// Settings of one estimate. Parser, defaults and schema of a document derive from this type.
-/// [`Settings::read`] adds the parts that need the rest of the document: semantic rules, and the document's
+/// [`RunSettings::read`] adds the parts that need the rest of the document: semantic rules, and the document's
 /// own variables and factors.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Settings {
+#[schemars(rename = "Settings")]
+pub struct RunSettings {
     /// Source of the sequence.
-    pub source: Arc<dyn Source>,
+    pub source: Arc<dyn SequenceSource>,
     /// Motion model between consecutive frames. Default: odometry.
     #[serde(default = "by_odometry", skip_serializing_if = "is_by_odometry")]
     pub motion: Arc<dyn MotionModel>,
@@ -69,14 +70,14 @@ pub struct Settings {
     pub gravity: Arc<dyn Gravity>,
     /// Rules that assign factors to objects.
     #[serde(skip_deserializing)]
-    pub semantics: Vec<Rule>,
+    pub semantics: Vec<SemanticRule>,
     /// Variables and factors that the document declares itself.
     #[serde(flatten, skip_deserializing)]
     #[schemars(skip)]
     pub own: OwnGraph,
     /// Class names with the same meaning, in addition to the built-in ones.
     #[serde(default, skip_serializing_if = "no_aliases")]
-    pub aliases: Aliases,
+    pub aliases: ClassAliases,
     /// Estimation of the noise. Default: none; the noise is used as given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variance_components: Option<VarianceSettings>,
@@ -94,12 +95,12 @@ pub struct Settings {
     pub report: ReportSettings,
 }
 
-fn no_aliases(aliases: &Aliases) -> bool {
+fn no_aliases(aliases: &ClassAliases) -> bool {
     aliases.0.is_empty()
 }
 
 fn by_odometry() -> Arc<dyn MotionModel> {
-    Arc::new(Odometry {})
+    Arc::new(OdometryMotion {})
 }
 
 /// Returns whether this is the default model, which is left out of a written document. Documents from before
@@ -109,11 +110,11 @@ fn is_by_odometry(motion: &Arc<dyn MotionModel>) -> bool {
 }
 
 fn given() -> Arc<dyn Association> {
-    Arc::new(Given {})
+    Arc::new(GivenAssociation {})
 }
 
 fn from_source() -> Arc<dyn Gravity> {
-    Arc::new(FromSource {})
+    Arc::new(SourceGravity {})
 }
 
 /// Levenberg-Marquardt with equal damping in all directions. If damping were proportional to the diagonal of
@@ -122,7 +123,7 @@ fn default_solver() -> Arc<dyn Optimizer> {
     Arc::new(LevenbergMarquardt { diagonal: DiagonalLimits::EVEN, ..LevenbergMarquardt::default() })
 }
 
-impl Settings {
+impl RunSettings {
     /// Reads settings. Paths are relative to `folder`.
     ///
     /// # Errors
@@ -130,7 +131,7 @@ impl Settings {
     pub fn read(node: &Node, folder: &Path) -> Result<Self, Diagnostics> {
         let errors = Errors::new();
         let settings = Section::new(node, &errors).and_then(|mut section| {
-            let own = OwnGraph::take(&mut section);
+            let own = OwnGraph::read_section(&mut section);
             let semantics = read_semantics(section.optional_node("semantics"), folder, &own.values, &errors);
             let mut settings = Self { semantics, own, ..section.rest()? };
             if let Some(prior) = &mut settings.prior_map {
@@ -146,7 +147,7 @@ impl Settings {
     fn check_motion(&self, node: &Node, errors: &Errors) {
         let place = |field: &str| node.field(field).unwrap_or(node).place.clone();
         let model = self.motion.typetag_name();
-        for (key, prefix) in self.own.numbered(self.motion.prefixes()) {
+        for (key, prefix) in self.own.numbered_variables(self.motion.prefixes()) {
             let message = format!("`{key}` is the key of a variable of the motion model `{model}`");
             let help = format!("{prefix}0, {prefix}1, … are variables of the frames: choose another name");
             errors.report(place("variables"), Fault::with_help(message, help));

@@ -35,12 +35,12 @@ pub fn align(pairs: &[PosePair], kind: Alignment) -> Result<(Similarity, Vec<Pos
     let similarity = match kind {
         Alignment::None => Similarity::rigid(Se3::identity()),
         Alignment::FirstPose => Similarity::rigid(first.truth.compose(&first.estimate.inverse())),
-        Alignment::Se3 => points.rigid(FLAT).ok_or(MetricsError::Degenerate)?,
-        Alignment::Sim3 => points.similarity(FLAT).ok_or(MetricsError::Degenerate)?,
+        Alignment::Se3 => points.rigid(COLLINEAR_RATIO).ok_or(MetricsError::Degenerate)?,
+        Alignment::Sim3 => points.similarity(COLLINEAR_RATIO).ok_or(MetricsError::Degenerate)?,
     };
     let aligned = |p: &PosePair| PosePair { estimate: similarity.act_on_pose(&p.estimate), ..*p };
     Ok((similarity, pairs.iter().map(aligned).collect()))
 }
 
 /// Singular value, relative to the largest, below which positions lie on one line: 0.3 mm on 300 m.
-const FLAT: f64 = 1e-12;
+const COLLINEAR_RATIO: f64 = 1e-12;

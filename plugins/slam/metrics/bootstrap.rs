@@ -33,11 +33,11 @@ pub fn bootstrap(clusters: &[Vec<f64>], resamples: usize, seed: u64) -> Option<I
     // the mean needs only the sums of the clusters
     let sums = clusters.iter().filter(|c| !c.is_empty()).map(|c| [c.iter().sum(), c.len() as f64]);
     let sums: Vec<[f64; 2]> = sums.collect();
-    (!sums.is_empty()).then(|| drawn(&sums, |[sum, count]| sum / count, resamples, seed))
+    (!sums.is_empty()).then(|| resample(&sums, |[sum, count]| sum / count, resamples, seed))
 }
 
 /// Returns `of` the sum over all clusters, and its percentile interval.
-fn drawn(sums: &[[f64; 2]], of: fn([f64; 2]) -> f64, resamples: usize, seed: u64) -> Interval {
+fn resample(sums: &[[f64; 2]], of: fn([f64; 2]) -> f64, resamples: usize, seed: u64) -> Interval {
     let add = |a: [f64; 2], b: &[f64; 2]| [a[0] + b[0], a[1] + b[1]];
     let mean = of(sums.iter().fold([0.0; 2], add));
     if sums.len() < 2 || resamples < 2 {
@@ -54,7 +54,7 @@ fn drawn(sums: &[[f64; 2]], of: fn([f64; 2]) -> f64, resamples: usize, seed: u64
 
 /// Length of the blocks, in seconds. Errors of a trajectory are correlated in time, so whole blocks are
 /// resampled.
-const BLOCK: f64 = 10.0;
+const BLOCK_S: f64 = 10.0;
 /// Number of resamples, and the seed of the draws.
 const RESAMPLES: usize = 2000;
 const SEED: u64 = 1;
@@ -67,13 +67,13 @@ pub fn change_of_error(before: &[PosePair], after: &[PosePair]) -> Option<Interv
     let mut blocks: BTreeMap<u64, [f64; 2]> = BTreeMap::new();
     for (pairs, side) in [(after, 0), (before, 1)] {
         for pair in pairs {
-            let block = ((pair.timestamp - began).max(0.0) / BLOCK) as u64;
+            let block = ((pair.timestamp - began).max(0.0) / BLOCK_S) as u64;
             let off = (pair.truth.translation - pair.estimate.translation).norm_squared();
             blocks.entry(block).or_default()[side] += off;
         }
     }
     let sums: Vec<[f64; 2]> = blocks.into_values().collect();
-    let change = drawn(&sums, |[after, before]| (after / before).sqrt() - 1.0, RESAMPLES, SEED);
+    let change = resample(&sums, |[after, before]| (after / before).sqrt() - 1.0, RESAMPLES, SEED);
     Some(change).filter(|change| change.mean.is_finite())
 }
 
@@ -82,14 +82,14 @@ mod tests {
     use super::*;
     use manifactor_geometry::{Se3, So3};
 
-    fn alone(values: impl IntoIterator<Item = f64>) -> Vec<Vec<f64>> {
+    fn as_clusters(values: impl IntoIterator<Item = f64>) -> Vec<Vec<f64>> {
         values.into_iter().map(|x| vec![x]).collect()
     }
 
     #[test]
     fn an_interval_is_that_of_the_normal_law_for_many_values() {
         // 1 to 400: the standard error of the mean is 400 / √12 / √400
-        let interval = bootstrap(&alone((1..=400).map(f64::from)), 4000, 1).unwrap();
+        let interval = bootstrap(&as_clusters((1..=400).map(f64::from)), 4000, 1).unwrap();
         let expected = 1.96 * 400.0 / 12f64.sqrt() / 20.0;
         assert_eq!(interval.mean, 200.5);
         let (low, high) = (interval.low.unwrap(), interval.high.unwrap());
@@ -99,14 +99,14 @@ mod tests {
 
     #[test]
     fn what_is_alike_within_a_cluster_counts_once() {
-        let apart = bootstrap(&alone([1.0, 2.0, 3.0, 4.0]), 2000, 7).unwrap();
+        let apart = bootstrap(&as_clusters([1.0, 2.0, 3.0, 4.0]), 2000, 7).unwrap();
         let tenfold: Vec<Vec<f64>> = [1.0, 2.0, 3.0, 4.0].map(|x| vec![x; 10]).into();
         assert_eq!(bootstrap(&tenfold, 2000, 7).unwrap(), apart);
     }
 
     #[test]
     fn the_same_seed_gives_the_same_bits() {
-        let values = alone((0..50).map(|i| f64::from(i * i)));
+        let values = as_clusters((0..50).map(|i| f64::from(i * i)));
         assert_eq!(bootstrap(&values, 500, 3), bootstrap(&values, 500, 3));
         assert_ne!(bootstrap(&values, 500, 3), bootstrap(&values, 500, 4));
         assert_eq!(bootstrap(&[], 500, 3), None);
@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn one_value_or_one_cluster_or_one_sample_has_no_interval() {
         for (clusters, resamples) in
-            [(alone([2.0]), 100), (vec![vec![1.0, 3.0]], 100), (alone([1.0, 3.0]), 1)]
+            [(as_clusters([2.0]), 100), (vec![vec![1.0, 3.0]], 100), (as_clusters([1.0, 3.0]), 1)]
         {
             let interval = bootstrap(&clusters, resamples, 1).unwrap();
             assert_eq!(interval, Interval { mean: 2.0, low: None, high: None });
@@ -125,7 +125,7 @@ mod tests {
     }
 
     /// Poses at intervals of one second, with the given position errors.
-    fn off(by: impl Fn(usize) -> f64) -> Vec<PosePair> {
+    fn poses_with_errors(by: impl Fn(usize) -> f64) -> Vec<PosePair> {
         let pair = |i: usize| PosePair {
             timestamp: i as f64,
             truth: Se3::identity(),
@@ -136,12 +136,13 @@ mod tests {
 
     #[test]
     fn a_change_that_is_everywhere_is_certain_and_one_in_a_single_block_is_not() {
-        let before = off(|_| 0.1);
-        let certain = change_of_error(&before, &off(|_| 0.08)).unwrap();
+        let before = poses_with_errors(|_| 0.1);
+        let certain = change_of_error(&before, &poses_with_errors(|_| 0.08)).unwrap();
         assert!((certain.mean + 0.2).abs() < 1e-12 && certain.excludes_zero(), "{certain:?}");
-        let uncertain = change_of_error(&before, &off(|i| if i < 10 { 0.0 } else { 0.1 })).unwrap();
+        let uncertain =
+            change_of_error(&before, &poses_with_errors(|i| if i < 10 { 0.0 } else { 0.1 })).unwrap();
         assert!(uncertain.mean < 0.0 && !uncertain.excludes_zero(), "{uncertain:?}");
-        assert_eq!(change_of_error(&off(|_| 0.0), &before), None);
+        assert_eq!(change_of_error(&poses_with_errors(|_| 0.0), &before), None);
         assert_eq!(change_of_error(&[], &[]), None);
     }
 }

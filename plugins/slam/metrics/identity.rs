@@ -32,12 +32,12 @@ pub struct IdentityScores {
     pub switches: usize,
     /// Number of true objects.
     pub true_objects: usize,
-    /// Number of objects with at least [`ENOUGH`] boxes.
+    /// Number of objects with at least [`MIN_OBJECT_BOXES`] boxes.
     pub objects: usize,
 }
 
 /// Smallest number of boxes of an object that counts.
-pub const ENOUGH: usize = 3;
+pub const MIN_OBJECT_BOXES: usize = 3;
 
 /// Scores boxes in the order of time. Each has its true object and its assigned object; a box without an
 /// assigned object is alone.
@@ -48,7 +48,7 @@ where
 {
     /// An assigned object, or a box that is alone and counts as an object.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-    enum Put<P> {
+    enum AssignedObject<P> {
         Into(P),
         Alone(usize),
     }
@@ -60,7 +60,7 @@ where
         {
             switches += 1;
         }
-        let put = put.map_or(Put::Alone(all), Put::Into);
+        let put = put.map_or(AssignedObject::Alone(all), AssignedObject::Into);
         *cells.entry((truth, put)).or_insert(0_usize) += 1;
         *truths.entry(truth).or_insert(0_usize) += 1;
         *found.entry(put).or_insert(0_usize) += 1;
@@ -83,8 +83,8 @@ where
     let mut shared = BTreeMap::new();
     for ((truth, put), n) in &cells {
         match put {
-            Put::Into(put) => shared.insert((*truth, Some(*put)), *n),
-            Put::Alone(_) => shared.insert((*truth, None), 1),
+            AssignedObject::Into(put) => shared.insert((*truth, Some(*put)), *n),
+            AssignedObject::Alone(_) => shared.insert((*truth, None), 1),
         };
     }
     IdentityScores {
@@ -97,7 +97,7 @@ where
         identity_f1: best_match(&shared, &truths) as f64 / total,
         switches,
         true_objects: truths.len(),
-        objects: found.values().filter(|n| **n >= ENOUGH).count(),
+        objects: found.values().filter(|n| **n >= MIN_OBJECT_BOXES).count(),
     }
 }
 

@@ -1,5 +1,5 @@
 //! Pairs of equal boxes in two files of detections.
-use manifactor_formats::detections::Detection;
+use manifactor_formats::detections::DetectionRow;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::iter::repeat;
@@ -20,11 +20,11 @@ struct EqualBoxes {
 ///
 /// The pairing of equal boxes with different objects does not depend on the order of the rows: first the
 /// objects that share the most other boxes, then the rest by number.
-pub fn pair_boxes(truth: &[Detection], estimate: &[Detection]) -> Vec<(u32, Option<Option<u32>>)> {
+pub fn pair_boxes(truth: &[DetectionRow], estimate: &[DetectionRow]) -> Vec<(u32, Option<Option<u32>>)> {
     // 0.0 and -0.0 are equal, but have different bits
     let bits = |x: f64| (x + 0.0).to_bits();
-    let key = |d: &Detection| [d.timestamp, d.xmin, d.ymin, d.xmax, d.ymax].map(bits);
-    let object = |d: &Detection| d.object_key.filter(|key| *key != 0);
+    let key = |d: &DetectionRow| [d.timestamp, d.xmin, d.ymin, d.xmax, d.ymax].map(bits);
+    let object = |d: &DetectionRow| d.object_key.filter(|key| *key != 0);
     let mut boxes: HashMap<_, EqualBoxes> = HashMap::new();
     for d in truth {
         let equal = boxes.entry(key(d)).or_default();

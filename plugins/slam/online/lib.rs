@@ -5,4 +5,4 @@
 //! first finds the camera in that map.
 mod mapper;
 
-pub use mapper::{FinishError, FrameError, FrameReport, Located, Mapper};
+pub use mapper::{FinishError, FrameError, FrameReport, Mapper, Relocalization};

@@ -11,32 +11,32 @@ mod object;
 mod present;
 mod revision;
 
-use association::Known;
-use frame::Seen;
-use gravity::Up;
-use manifactor_association::{Associator, Image, Learned, Map, Names};
+use association::AssociationContext;
+use frame::FrameBoxes;
+use gravity::UpEstimate;
+use manifactor_association::{Associator, Corrections, FrameDetections, MapEstimate, ObjectIdChanges};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{TypeName, manifold_name};
 use manifactor_mapping::estimate::{Estimate, EstimateError};
 use manifactor_mapping::gravity::GravityError;
-use manifactor_mapping::mapping::measurements::{Measured, Measurements};
-use manifactor_mapping::mapping::rules::Ledger;
+use manifactor_mapping::mapping::measurements::{Measurements, ObjectMeasurements};
+use manifactor_mapping::mapping::rules::SemanticFactors;
 use manifactor_mapping::mapping::{Mapping, MappingError, object_key, pose_key, rejection};
 use manifactor_mapping::motion::MotionError;
 use manifactor_mapping::semantics::RuleError;
-use manifactor_mapping::settings::Settings;
+use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::{Camera, DualQuadric};
-use manifactor_recording::sequence::{Frame, ObjectId, Observation, Opening, Sequence};
+use manifactor_recording::sequence::{Frame, ObjectId, Observation, Sequence, SequenceHeader};
 use manifactor_smoother::{ChangeError, Smoother, UpdateError};
 use manifactor_solve::Observer;
-use object::Tracked;
+use object::ObjectState;
 use std::any::TypeId;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub use frame::FrameReport;
-pub use locate::Located;
+pub use locate::Relocalization;
 
 /// A map that grows with each frame.
 ///
@@ -45,22 +45,22 @@ pub use locate::Located;
 /// the smoother, if there is one.
 #[derive(Debug)]
 pub struct Mapper {
-    settings: Arc<Settings>,
+    settings: Arc<RunSettings>,
     camera: Camera,
-    session: Smoother,
-    up: Up,
+    smoother: Smoother,
+    up: UpEstimate,
     associator: Box<dyn Associator>,
     /// Current objects of detections that were assigned differently at first.
-    names: Names,
+    id_changes: ObjectIdChanges,
     /// Corrections to earlier frames, for the next update.
-    pending: Vec<Learned>,
+    pending: Vec<Corrections>,
     measurements: Measurements,
-    objects: BTreeMap<ObjectId, Tracked>,
-    ledger: Ledger,
+    objects: BTreeMap<ObjectId, ObjectState>,
+    semantic_factors: SemanticFactors,
     /// The last accepted frame.
     last: Option<Frame>,
     /// Pose estimates at the time of their frames.
-    live: Vec<StampedPose>,
+    live_poses: Vec<StampedPose>,
 }
 
 /// Reason why a frame is rejected. The map stays unchanged, and the next frame is connected to the last
@@ -70,7 +70,7 @@ pub struct Mapper {
 pub enum FrameError {
     /// The timestamp is not later than the one before.
     #[error("the frame at {timestamp} s is left out: it does not come after the one before, at {before} s")]
-    Time {
+    Timestamp {
         /// Timestamp of the frame, in seconds.
         timestamp: f64,
         /// Timestamp of the previous frame, in seconds.
@@ -115,9 +115,9 @@ pub enum FinishError {
 }
 
 impl Mapper {
-    /// Creates a map with the settings [for streams](Settings::for_stream). It is empty, or has the objects
+    /// Creates a map with the settings [for streams](RunSettings::for_stream). It is empty, or has the objects
     /// of the prior map if the settings give one with a start pose.
-    pub fn new(opening: Opening, settings: &Settings) -> Self {
+    pub fn new(opening: SequenceHeader, settings: &RunSettings) -> Self {
         let settings = settings.clone().for_stream();
         let mut online = settings.online.clone();
         if let Some(window) = &mut online.window {
@@ -127,23 +127,25 @@ impl Mapper {
             window.keep.extend(kept.filter_map(|name| TypeName::new(name).ok()));
         }
         let trusted = settings.prior_map.as_ref().filter(|prior| prior.start.is_some());
-        let known = trusted.map(|prior| prior.trusted_map().objects).unwrap_or_default();
+        let known = trusted.map(|prior| prior.inflated_map().objects).unwrap_or_default();
         let measurements = Measurements::new(settings.anchor());
-        let objects =
-            measurements.objects.iter().filter_map(|measured| Some((measured.id, Tracked::known(measured)?)));
+        let objects = measurements
+            .objects
+            .iter()
+            .filter_map(|measured| Some((measured.id, ObjectState::of_prior_object(measured)?)));
         Self {
             camera: opening.camera,
-            session: Smoother::new(online),
-            associator: settings.association.begin(opening.camera, &settings.aliases, &known),
+            smoother: Smoother::new(online),
+            associator: settings.association.create_associator(opening.camera, &settings.aliases, &known),
             settings: Arc::new(settings),
-            names: Names::default(),
+            id_changes: ObjectIdChanges::default(),
             pending: vec![],
-            up: Up::new(opening),
+            up: UpEstimate::new(opening),
             objects: objects.collect(),
             measurements,
-            ledger: Ledger::default(),
+            semantic_factors: SemanticFactors::default(),
             last: None,
-            live: vec![],
+            live_poses: vec![],
         }
     }
 
@@ -152,61 +154,70 @@ impl Mapper {
     ///
     /// # Errors
     /// If the pose is rejected. Rejected boxes are not an error: the report lists them.
-    pub fn take(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
-        let mut report = FrameReport::new(self.live.len(), observation.frame.timestamp);
-        let seen = self.take_pose(observation, &mut report)?;
-        self.revise(seen, &mut report);
+    pub fn add_frame(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
+        let mut report = FrameReport::new(self.live_poses.len(), observation.frame.timestamp);
+        let seen = self.add_pose(observation, &mut report)?;
+        self.update_objects(seen, &mut report);
         report.pose = self.pose(report.frame).unwrap_or(report.pose);
-        self.live.push(StampedPose { timestamp: report.timestamp, pose: report.pose });
+        self.live_poses.push(StampedPose { timestamp: report.timestamp, pose: report.pose });
         Ok(report)
     }
 
     /// Reconsiders all frames after the last one, and corrects their data association. The changes are
     /// reported as those of the last frame.
-    pub fn settle(&mut self) -> FrameReport {
-        let frame = self.live.len();
+    pub fn finish_association(&mut self) -> FrameReport {
+        let frame = self.live_poses.len();
         let last = self.last.as_ref().map_or(0.0, |last| last.timestamp);
         let mut report = FrameReport::new(frame.saturating_sub(1), last);
-        let (live, session, measurements) = (&self.live, &self.session, &self.measurements);
-        let known = Known { newest: (frame, Se3::identity()), live, session, measurements };
-        let learned = self.associator.settle(&known);
-        self.teach(learned, &mut report);
-        if let Some(corrected) = self.correct(&mut report) {
-            match self.session.update() {
+        let (live, session, measurements) = (&self.live_poses, &self.smoother, &self.measurements);
+        let known = AssociationContext {
+            newest: (frame, Se3::identity()),
+            live_poses: live,
+            smoother: session,
+            measurements,
+        };
+        let learned = self.associator.finish_association(&known);
+        self.queue_corrections(learned, &mut report);
+        if let Some(corrected) = self.apply_pending_corrections(&mut report) {
+            match self.smoother.update() {
                 Ok(update) => {
-                    self.names = corrected.names;
+                    self.id_changes = corrected.id_changes;
                     report.updates.push(update);
                 }
-                Err(error) => self.undo(corrected, &error.to_string(), &mut report),
+                Err(error) => self.undo_corrections(corrected, &error.to_string(), &mut report),
             }
         }
-        self.revise(Seen::nothing(), &mut report);
+        self.update_objects(FrameBoxes::without_boxes(), &mut report);
         report.pose = self.pose(report.frame).unwrap_or(report.pose);
         report
     }
 
     /// Returns the smoother with the current graph and estimate.
-    pub fn session(&mut self) -> &mut Smoother {
-        &mut self.session
+    pub fn smoother(&mut self) -> &mut Smoother {
+        &mut self.smoother
     }
 
     /// Returns the objects of the boxes of an earlier frame with all frames known. `names` are the objects
     /// assigned so far.
-    pub fn reconsider(
+    pub fn reassociate(
         &self,
         frame: usize,
         observation: &Observation,
         names: &[Option<ObjectId>],
     ) -> Vec<Option<ObjectId>> {
-        let none = (self.live.len(), Se3::identity());
-        let Some(pose) = self.known(none).pose(frame) else { return names.to_vec() };
+        let none = (self.live_poses.len(), Se3::identity());
+        let Some(pose) = self.association_context(none).pose(frame) else { return names.to_vec() };
         let (timestamp, detections) = (observation.frame.timestamp, observation.detections.as_slice());
-        self.associator.reconsider(&Image { frame, timestamp, detections }, names, &self.known((frame, pose)))
+        self.associator.reassociate(
+            &FrameDetections { frame, timestamp, detections },
+            names,
+            &self.association_context((frame, pose)),
+        )
     }
 
     /// Returns the current ids of the objects of all detections.
-    pub fn names(&self) -> &Names {
-        &self.names
+    pub fn id_changes(&self) -> &ObjectIdChanges {
+        &self.id_changes
     }
 
     /// Returns the measurements of each object.
@@ -215,13 +226,13 @@ impl Mapper {
     }
 
     /// Returns the number of objects in the map.
-    pub fn mapped(&self) -> usize {
+    pub fn mapped_objects(&self) -> usize {
         self.objects.values().filter(|object| object.is_mapped()).count()
     }
 
     /// Returns the pose estimates at the time of their frames.
-    pub fn live(&self) -> &[StampedPose] {
-        &self.live
+    pub fn live_poses(&self) -> &[StampedPose] {
+        &self.live_poses
     }
 
     /// Solves the whole graph as one batch, starting from the estimate. Objects that could not be initialized
@@ -234,24 +245,29 @@ impl Mapper {
         sequence: Arc<Sequence>,
         observer: &mut dyn Observer,
     ) -> Result<Estimate, FinishError> {
-        let frame = self.up.frame().ok_or(MappingError::NoFrames)?;
-        let poses: Vec<Se3> = (0..self.live.len()).filter_map(|i| self.pose_of(i)).collect();
-        let start = |measured: &Measured| match self.objects.get(&measured.id).and_then(Tracked::born_as) {
+        let frame = self.up.map_frame().ok_or(MappingError::NoFrames)?;
+        let poses: Vec<Se3> = (0..self.live_poses.len()).filter_map(|i| self.pose_of(i)).collect();
+        let start = |measured: &ObjectMeasurements| match self
+            .objects
+            .get(&measured.id)
+            .and_then(ObjectState::initial_value)
+        {
             Some(start) => Ok(start),
             None => {
-                let at = |i: usize| Some(StampedPose { pose: *poses.get(i)?, ..*self.live.get(i)? });
-                rejection::start(measured, at, self.camera, &self.settings)
+                let at = |i: usize| Some(StampedPose { pose: *poses.get(i)?, ..*self.live_poses.get(i)? });
+                rejection::initial_quadric(measured, at, self.camera, &self.settings)
             }
         };
         let starts = self.measurements.objects.iter().map(start).collect();
-        let decisions = self.ledger.complete(&self.measurements, starts, &self.settings, frame.up);
+        let decisions =
+            self.semantic_factors.complete_decisions(&self.measurements, starts, &self.settings, frame.up);
         let decisions = decisions.map_err(MappingError::from)?;
         let mapping = Mapping::assemble(&sequence, &self.settings, frame, self.measurements, decisions)?;
         let mut values = mapping.values.clone();
         for (i, pose) in poses.into_iter().enumerate() {
             values.insert(pose_key(i), pose);
         }
-        for (key, value) in self.session.estimates().iter() {
+        for (key, value) in self.smoother.estimates().iter() {
             if values.contains(key.as_str()) {
                 values.insert_boxed(key.clone(), value.erased().clone_box());
             }
@@ -261,21 +277,21 @@ impl Mapper {
 
     /// Returns the estimate of a pose; `None` if it is not in the smoother.
     fn pose(&self, frame: usize) -> Option<Se3> {
-        self.session.get(pose_key(frame).as_str()).ok()
+        self.smoother.get(pose_key(frame).as_str()).ok()
     }
 
     /// Returns the estimate of a pose with its time. Includes the frame in progress.
-    fn at(&self, frame: usize) -> Option<StampedPose> {
-        let timestamp = self.live.get(frame).map(|live| live.timestamp);
+    fn stamped_pose(&self, frame: usize) -> Option<StampedPose> {
+        let timestamp = self.live_poses.get(frame).map(|live| live.timestamp);
         let newest = self.last.as_ref().map(|last| last.timestamp);
         Some(StampedPose { timestamp: timestamp.or(newest)?, pose: self.pose(frame)? })
     }
 
-    fn measured(&self, id: ObjectId) -> Option<&Measured> {
+    fn measured(&self, id: ObjectId) -> Option<&ObjectMeasurements> {
         self.measurements.object(id)
     }
 
     fn quadric(&self, id: ObjectId) -> Option<DualQuadric> {
-        self.session.get(object_key(id).as_str()).ok()
+        self.smoother.get(object_key(id).as_str()).ok()
     }
 }

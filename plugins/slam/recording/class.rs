@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Spellings of detectors and data sets, with the names that COCO's own papers print.
-const SHIPPED: [(&str, &str); 12] = [
+const CLASS_SYNONYMS: [(&str, &str); 12] = [
     ("tvmonitor", "tv monitor"),
     ("tv", "tv monitor"),
     ("monitor", "tv monitor"),
@@ -25,21 +25,22 @@ const SHIPPED: [(&str, &str); 12] = [
 /// `pottedplant`, `couch` and similar names are built in.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
-pub struct Aliases(
+#[schemars(rename = "Aliases")]
+pub struct ClassAliases(
     #[schemars(with = "std::collections::HashMap<String, String>")] pub IndexMap<String, String>,
 );
 
-impl Aliases {
+impl ClassAliases {
     /// Returns the unique name of a class.
     pub fn canonical(&self, name: &str) -> String {
         let name = plain(name);
         let own = self.0.iter().find(|(alias, _)| plain(alias) == name).map(|(_, class)| plain(class));
-        own.or_else(|| shipped(&name)).unwrap_or(name)
+        own.or_else(|| shipped_synonym(&name)).unwrap_or(name)
     }
 }
 
-fn shipped(name: &str) -> Option<String> {
-    SHIPPED.iter().find(|(alias, _)| *alias == name).map(|(_, class)| (*class).to_owned())
+fn shipped_synonym(name: &str) -> Option<String> {
+    CLASS_SYNONYMS.iter().find(|(alias, _)| *alias == name).map(|(_, class)| (*class).to_owned())
 }
 
 fn plain(name: &str) -> String {
@@ -53,7 +54,7 @@ mod tests {
 
     #[test]
     fn spellings_of_one_class_have_one_name() {
-        let aliases = Aliases::default();
+        let aliases = ClassAliases::default();
         for name in ["tvmonitor", "TV", "tv_monitor", "Tv  Monitor"] {
             assert_eq!(aliases.canonical(name), "tv monitor");
         }
@@ -62,16 +63,16 @@ mod tests {
 
     #[test]
     fn an_alias_of_ones_own_goes_first() {
-        let aliases = Aliases(IndexMap::from([("TV".to_owned(), "Television".to_owned())]));
+        let aliases = ClassAliases(IndexMap::from([("TV".to_owned(), "Television".to_owned())]));
         assert_eq!(aliases.canonical("tv"), "television");
         assert_eq!(aliases.canonical("tvmonitor"), "tv monitor");
     }
 
     #[test]
     fn no_shipped_alias_leads_to_another() {
-        for (alias, class) in SHIPPED {
+        for (alias, class) in CLASS_SYNONYMS {
             assert_eq!(plain(alias), alias);
-            assert_eq!(shipped(class), None);
+            assert_eq!(shipped_synonym(class), None);
         }
     }
 }

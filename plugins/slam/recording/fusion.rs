@@ -1,5 +1,5 @@
 //! Fusion of an object's detections into one class.
-use crate::class::Aliases;
+use crate::class::ClassAliases;
 use crate::sequence::ClassScores;
 use indexmap::IndexMap;
 use serde::de::Error;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 /// reports only its best class, the average is a vote weighted by the scores.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Fusion {
+pub struct ClassFusion {
     /// Scores, summed over the detections.
     #[serde(rename = "scores", deserialize_with = "sums")]
     sums: IndexMap<String, f64>,
@@ -54,9 +54,9 @@ impl FusedClass {
     }
 }
 
-impl Fusion {
+impl ClassFusion {
     /// Adds a detection.
-    pub fn add(&mut self, scores: &ClassScores, aliases: &Aliases) {
+    pub fn add(&mut self, scores: &ClassScores, aliases: &ClassAliases) {
         self.detections += 1;
         for (class, score) in scores.iter() {
             *self.sums.entry(aliases.canonical(class)).or_default() += score;
@@ -64,7 +64,7 @@ impl Fusion {
     }
 
     /// Removes a detection that was added before.
-    pub fn take_back(&mut self, scores: &ClassScores, aliases: &Aliases) {
+    pub fn remove(&mut self, scores: &ClassScores, aliases: &ClassAliases) {
         self.detections = self.detections.saturating_sub(1);
         for (class, score) in scores.iter() {
             if let Some(sum) = self.sums.get_mut(&*aliases.canonical(class)) {
@@ -82,7 +82,7 @@ impl Fusion {
     }
 
     /// Returns the scores under the canonical names of `aliases`; scores of synonyms are added up.
-    pub fn canonical(&self, aliases: &Aliases) -> Self {
+    pub fn canonical(&self, aliases: &ClassAliases) -> Self {
         let mut sums = IndexMap::new();
         for (class, sum) in &self.sums {
             *sums.entry(aliases.canonical(class)).or_default() += sum;
@@ -129,10 +129,10 @@ mod tests {
     use super::*;
 
     fn fuse(detections: &[&[(&str, f64)]]) -> FusedClass {
-        let mut fusion = Fusion::default();
+        let mut fusion = ClassFusion::default();
         for scores in detections {
             let scores = scores.iter().map(|(class, score)| ((*class).to_owned(), *score)).collect();
-            fusion.add(&scores, &Aliases::default());
+            fusion.add(&scores, &ClassAliases::default());
         }
         fusion.best().unwrap()
     }
@@ -160,6 +160,6 @@ mod tests {
 
     #[test]
     fn no_detection_has_no_class() {
-        assert_eq!(Fusion::default().best(), None);
+        assert_eq!(ClassFusion::default().best(), None);
     }
 }

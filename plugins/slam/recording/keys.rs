@@ -14,6 +14,14 @@ pub fn object_key(id: ObjectId) -> Key {
     Key::indexed("q", id)
 }
 
+/// Returns the number of a key that is a prefix and a number, as digits: `12` of `x12` with the prefix `x`.
+/// `None` for any other key.
+pub fn key_number<'k>(key: &'k Key, prefix: &str) -> Option<&'k str> {
+    let number = key.as_str().strip_prefix(prefix)?;
+    let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+    is_number.then_some(number)
+}
+
 /// Number of an object, shared by detections and ground truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]

@@ -1,7 +1,7 @@
 //! The input of a run: frames with odometry, detections and ground truth, and the sources that read them.
 //!
-//! A [`Source`](source::Source) gives a [`Sequence`](sequence::Sequence), or its frames one by one as a
-//! [`Stream`](source::stream::Stream). A detection has a box, scores of classes, and further quantities, each a
+//! A [`SequenceSource`](source::SequenceSource) gives a [`Sequence`](sequence::Sequence), or its frames one by one as a
+//! [`FrameStream`](source::stream::FrameStream). A detection has a box, scores of classes, and further quantities, each a
 //! [`Measurement`](measurement::Measurement).
 #[doc(hidden)]
 pub mod __private {

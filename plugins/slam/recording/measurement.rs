@@ -1,5 +1,5 @@
 //! Interface of measurements: quantities that a detection measures in addition to its box, such as a
-//! [`Depth`].
+//! [`DepthMeasurement`].
 //!
 //! A type of measurement is one file: it implements [`Measurement`] and ends with `register_measurement!`.
 //! Its name becomes a field of a box in JSON lines. Its factor is added to the graph, and data association
@@ -17,13 +17,13 @@ use std::sync::Arc;
 
 mod depth;
 
-pub use depth::Depth;
+pub use depth::DepthMeasurement;
 
 /// Largest number of rows of one measurement.
 pub const ROWS: usize = 4;
 
 /// One number for each row of a measurement; further entries are ignored.
-pub type Rows = SVector<f64, ROWS>;
+pub type ResidualRows = SVector<f64, ROWS>;
 
 /// A quantity that a detection measures of its object in addition to its box.
 pub trait Measurement: Debug + Send + Sync {
@@ -43,7 +43,7 @@ pub trait Measurement: Debug + Send + Sync {
     }
 
     /// Returns the standard deviations of the rows if the factor's residual is `residual`.
-    fn deviations(&self, errors: &Errors, residual: &Rows) -> Rows;
+    fn deviations(&self, errors: &MeasurementSigmas, residual: &ResidualRows) -> ResidualRows;
 
     /// Returns -2 ln of the density of the measured value for an object that was never detected before.
     fn cost_of_new(&self, usual: &UsualDepth) -> f64;
@@ -73,7 +73,7 @@ pub trait Measurement: Debug + Send + Sync {
 
 /// Errors of measurements from the settings.
 #[derive(Debug, Clone, Copy)]
-pub struct Errors {
+pub struct MeasurementSigmas {
     /// Standard deviation of depths, as a fraction of the depth.
     pub depth: f64,
 }
@@ -94,7 +94,7 @@ pub struct Innovation {
     /// Number of valid rows; the remaining rows are zero.
     pub rows: usize,
     /// Predicted minus measured value.
-    pub residual: Rows,
+    pub residual: ResidualRows,
     /// Derivative with respect to the tangent of the pose.
     pub by_pose: SMatrix<f64, ROWS, 6>,
     /// Derivative with respect to the tangent of the object.
@@ -105,7 +105,7 @@ impl Innovation {
     /// Returns zeros for this number of rows.
     pub fn none(rows: usize) -> Self {
         let (by_pose, by_object) = (SMatrix::zeros(), SMatrix::zeros());
-        Self { rows, residual: Rows::zeros(), by_pose, by_object }
+        Self { rows, residual: ResidualRows::zeros(), by_pose, by_object }
     }
 }
 
@@ -156,11 +156,11 @@ impl Quantities {
         &'a self,
         frame: usize,
         object: &'a Key,
-        errors: Errors,
+        errors: MeasurementSigmas,
         loss: Option<&'a Arc<dyn Loss>>,
     ) -> impl Iterator<Item = FactorEntry> + 'a {
         self.iter().filter_map(move |measurement| {
-            let deviations = measurement.deviations(&errors, &Rows::zeros());
+            let deviations = measurement.deviations(&errors, &ResidualRows::zeros());
             let noise = match &deviations.as_slice()[..measurement.rows().min(ROWS)] {
                 [sigma] => Noise::sigma(*sigma),
                 sigmas => Noise::sigmas(sigmas),
@@ -222,7 +222,7 @@ pub struct MeasurementKind {
 inventory::collect!(MeasurementKind);
 
 /// Registers a [`Measurement`](crate::measurement::Measurement) that serde can read:
-/// `register_measurement!("depth", Depth);`
+/// `register_measurement!("depth", DepthMeasurement);`
 #[macro_export]
 macro_rules! register_measurement {
     ($name:literal, $type:ty) => {

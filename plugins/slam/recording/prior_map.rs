@@ -3,8 +3,8 @@
 //! Each of its objects is a variable from the first frame on. A prior factor holds the object at its value in
 //! the map, with the covariance of the map. Detections of the object become its measurements, and semantic
 //! rules are not applied to it again.
-use crate::class::Aliases;
-use crate::fusion::Fusion;
+use crate::class::ClassAliases;
+use crate::fusion::ClassFusion;
 use crate::keys::ObjectId;
 use manifactor_config::{Diagnostics, Document, Errors, Fault};
 use manifactor_graph::noise::NoiseError;
@@ -37,14 +37,14 @@ pub struct PriorObject {
     /// Number of the object.
     pub id: ObjectId,
     /// Class scores of its detections.
-    pub classes: Fusion,
+    pub classes: ClassFusion,
     /// Estimate in the map frame.
     pub quadric: DualQuadric,
     /// Covariance of the estimate in tangent order: rotation in rad and centre in m, both in the object's
     /// frame, then the logarithms of the semi-axes.
     pub covariance: [[f64; 9]; 9],
     /// Number of looks at the object, with and without a detection.
-    pub looks: Looks,
+    pub looks: LookCounts,
     /// Smallest detected size in pixels: the square root of the box area. Default: unknown, as in maps of
     /// earlier programs.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "least_px")]
@@ -56,7 +56,7 @@ pub struct PriorObject {
 /// well.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Looks {
+pub struct LookCounts {
     /// Number of looks.
     pub expected: usize,
     /// Number of looks with at least one box.
@@ -120,7 +120,7 @@ impl PriorMap {
     }
 
     /// Returns the map with the canonical class names of `aliases`.
-    pub fn with_classes(mut self, aliases: &Aliases) -> Self {
+    pub fn with_classes(mut self, aliases: &ClassAliases) -> Self {
         for object in &mut self.objects {
             let object = Arc::make_mut(object);
             object.classes = object.classes.canonical(aliases);
@@ -153,7 +153,7 @@ impl PriorObject {
 
     /// Returns the object with its standard deviations multiplied by `sigma_scale` and enlarged by
     /// `shape_error`: in rad, as a fraction of its mean semi-axis, and in the logarithms of its semi-axes.
-    pub fn trusted(&self, sigma_scale: f64, shape_error: f64) -> Self {
+    pub fn inflated(&self, sigma_scale: f64, shape_error: f64) -> Self {
         let mut covariance = self.covariance.map(|row| row.map(|entry| entry * sigma_scale * sigma_scale));
         let size = self.quadric.semi_axes.mean();
         let errors = [1.0, size, 1.0].map(|of| shape_error * of);
@@ -164,9 +164,9 @@ impl PriorObject {
     }
 }
 
-impl Looks {
+impl LookCounts {
     /// Returns the probability of a detection in one look.
-    pub fn rate(&self) -> f64 {
+    pub fn detection_rate(&self) -> f64 {
         (self.seen + 1) as f64 / (self.expected + 2) as f64
     }
 
@@ -180,7 +180,7 @@ impl Looks {
 mod tests {
     use super::*;
 
-    fn told(change: impl FnOnce(&mut serde_json::Value)) -> String {
+    fn error_of(change: impl FnOnce(&mut serde_json::Value)) -> String {
         let row = |r: usize| (0..9).map(|c| if r == c { 0.01 } else { 0.0 }).collect::<Vec<f64>>();
         let object = serde_json::json!({
             "id": 3,
@@ -198,12 +198,12 @@ mod tests {
             .map_or_else(|error| error.to_string(), |map| format!("{} objects", map.objects.len()))
     }
 
-    type Change = fn(&mut serde_json::Value);
+    type DocumentEdit = fn(&mut serde_json::Value);
 
     #[test]
     fn a_file_that_is_no_map_is_told_at_its_place() {
-        assert_eq!(told(|_| {}), "1 objects");
-        let cases: [(&str, Change); 8] = [
+        assert_eq!(error_of(|_| {}), "1 objects");
+        let cases: [(&str, DocumentEdit); 8] = [
             ("a map of version 2, and this program reads version 1", |map| map["version"] = 2.into()),
             ("object 3 is there twice", |map| {
                 let again = map["objects"][0].clone();
@@ -217,16 +217,16 @@ mod tests {
             ("expected an array", |map| map["objects"] = "none".into()),
         ];
         for (expected, change) in cases {
-            let told = told(change);
+            let told = error_of(change);
             assert!(told.contains(expected), "{expected}: {told}");
         }
     }
 
     #[test]
     fn looks_say_how_likely_an_object_is_seen() {
-        let looks = Looks { expected: 8, seen: 8 }.plus(Looks { expected: 10, seen: 0 });
-        assert_eq!(looks, Looks { expected: 18, seen: 8 });
-        assert!((looks.rate() - 0.45).abs() < 1e-12);
-        assert!((Looks::default().rate() - 0.5).abs() < 1e-12);
+        let looks = LookCounts { expected: 8, seen: 8 }.plus(LookCounts { expected: 10, seen: 0 });
+        assert_eq!(looks, LookCounts { expected: 18, seen: 8 });
+        assert!((looks.detection_rate() - 0.45).abs() < 1e-12);
+        assert!((LookCounts::default().detection_rate() - 0.5).abs() < 1e-12);
     }
 }

@@ -1,8 +1,8 @@
-//! A sequence as files: what [`Recorded`](crate::source::Recorded) reads.
+//! A sequence as files: the input of [`RecordedFiles`](crate::source::RecordedFiles).
 use crate::measurement::Measurement;
 use crate::sequence::Sequence;
 use manifactor_formats::FormatError;
-use manifactor_formats::detections::{self, Detection};
+use manifactor_formats::detections::{self, DetectionRow};
 use manifactor_formats::tum::{self, StampedPose};
 use manifactor_formats::whole::write_whole;
 use serde_json::json;
@@ -10,7 +10,7 @@ use std::io;
 use std::path::Path;
 
 /// File of the true objects.
-pub(crate) const OBJECTS: &str = "objects.json";
+pub(crate) const OBJECTS_FILE: &str = "objects.json";
 
 /// Writes `odometry.txt` and `detections.csv` into a folder, and with ground truth also `groundtruth.txt` and
 /// `objects.json`. Creates the folder if it does not exist.
@@ -30,7 +30,7 @@ pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
     write_detections(sequence, &folder.join("detections.csv"))?;
     if let Some(truth) = &sequence.ground_truth {
         tum::write(folder.join("groundtruth.txt"), &truth.trajectory)?;
-        let path = folder.join(OBJECTS);
+        let path = folder.join(OBJECTS_FILE);
         write_whole(&path, format!("{:#}\n", json!(truth.objects)).as_bytes()).map_err(io(&path))?;
     }
     Ok(())
@@ -50,12 +50,12 @@ pub fn write_detections(sequence: &Sequence, file: &Path) -> Result<(), FormatEr
     detections::write(file, &rows(sequence))
 }
 
-fn rows(sequence: &Sequence) -> Vec<Detection> {
+fn rows(sequence: &Sequence) -> Vec<DetectionRow> {
     let row = |d: &crate::sequence::Detection| {
         let (class, score) = d.scores.best().unwrap_or_default();
         let all: Vec<_> = d.scores.iter().map(|(class, score)| format!("{class}:{score}")).collect();
         let [xmin, ymin, xmax, ymax] = d.bounding_box.bounds();
-        Some(Detection {
+        Some(DetectionRow {
             frame_idx: Some(d.frame as u64),
             timestamp: sequence.frames.get(d.frame)?.timestamp,
             frame_idx_as_published: None,

@@ -40,7 +40,7 @@ pub struct Sequence {
 #[derive(Debug, Clone, PartialEq)]
 pub enum UnusedDetection {
     /// Rows of a file whose time has no pose.
-    WithoutPose(WithoutPose),
+    WithoutPose(DetectionsWithoutPose),
     /// A box that cannot be read.
     Box {
         /// Timestamp of its frame. Unit: seconds.
@@ -54,7 +54,7 @@ pub enum UnusedDetection {
 
 /// Detections whose time has no pose.
 #[derive(Debug, Clone, PartialEq)]
-pub struct WithoutPose {
+pub struct DetectionsWithoutPose {
     /// Number of rows without a pose.
     pub rows: usize,
     /// Number of all rows.
@@ -68,14 +68,14 @@ pub struct WithoutPose {
     pub nearest: (f64, f64),
 }
 
-impl WithoutPose {
+impl DetectionsWithoutPose {
     /// Returns whether more rows than expected have no pose.
     pub fn is_too_many(&self) -> bool {
         self.rows as f64 > self.allowed * self.of as f64
     }
 }
 
-impl fmt::Display for WithoutPose {
+impl fmt::Display for DetectionsWithoutPose {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { rows, of, within, nearest: (at, away), .. } = self;
         write!(
@@ -88,7 +88,7 @@ impl fmt::Display for WithoutPose {
 
 /// Data of a recording that are known before its first frame.
 #[derive(Debug, Clone)]
-pub struct Opening {
+pub struct SequenceHeader {
     /// Camera, shared by all frames.
     pub camera: Camera,
     /// Up direction in the odometry frame, if the source knows it.
@@ -110,7 +110,7 @@ pub struct Observation {
     pub unused: Vec<UnusedDetection>,
 }
 
-impl Opening {
+impl SequenceHeader {
     /// Creates an opening with only a camera.
     pub fn new(camera: Camera) -> Self {
         Self { camera, up: None, ground_truth: None }
@@ -139,14 +139,14 @@ impl AsRef<Self> for Sequence {
 
 impl Sequence {
     /// Returns the data that are known before the first frame.
-    pub fn opening(&self) -> Opening {
-        Opening { camera: self.camera, up: self.up, ground_truth: self.ground_truth.clone() }
+    pub fn header(&self) -> SequenceHeader {
+        SequenceHeader { camera: self.camera, up: self.up, ground_truth: self.ground_truth.clone() }
     }
 
     /// Returns the frames in order of arrival. A reading of the accelerometer belongs to the first frame at
     /// or after its time.
     pub fn observations(&self) -> impl Iterator<Item = Observation> {
-        Observations::of(self)
+        Observations::from_sequence(self)
     }
 }
 

@@ -16,42 +16,42 @@ mod tum;
 
 pub use camera::CameraChoice;
 pub use json_lines::parse;
-pub use json_lines::{JsonLines, line};
-pub use recorded::Recorded;
+pub use json_lines::{JsonLines, format_line};
+pub use recorded::RecordedFiles;
 pub use rectification::Distortion;
-pub use stream::Stream;
+pub use stream::FrameStream;
 pub use tum::TumRgbd;
 
 /// A source of a sequence.
 #[typetag::serialize(tag = "type")]
-pub trait Source: Debug + Send + Sync {
+pub trait SequenceSource: Debug + Send + Sync {
     /// Reads or simulates the sequence.
     ///
     /// # Errors
     /// Missing or invalid files; empty sequences.
-    fn load(&self, folders: &Folders) -> Result<Sequence, SourceError>;
+    fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError>;
 
     /// Opens the sequence as a stream if frames arrive during mapping; `None` if all frames exist beforehand.
     ///
     /// # Errors
     /// Missing files.
-    fn open(&self, _folders: &Folders) -> Result<Option<Stream>, SourceError> {
+    fn open(&self, _folders: &InputFolders) -> Result<Option<FrameStream>, SourceError> {
         Ok(None)
     }
 }
 
-manifactor_graph::kind!(dyn Source, "source");
+manifactor_graph::kind!(dyn SequenceSource, "source");
 
 /// Folders that contain input files.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Folders {
+pub struct InputFolders {
     /// Folder with public data sets, one folder each: `--data`, or `MANIFACTOR_DATA`.
     pub data: Option<PathBuf>,
     /// Folder of the run's document, which its paths are relative to.
     pub document: PathBuf,
 }
 
-impl Folders {
+impl InputFolders {
     /// Returns the path of a file relative to the document.
     pub fn beside_document(&self, path: &Path) -> PathBuf {
         self.document.join(path)
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn a_folder_that_is_nowhere_is_told_with_the_places_tried() {
-        let folders = Folders { data: None, document: "runs".into() };
+        let folders = InputFolders { data: None, document: "runs".into() };
         let text = folders.data_set(Path::new("fr1")).unwrap_err().to_string();
         assert!(text.contains("MANIFACTOR_DATA") && text.ends_with("runs/fr1"), "{text}");
     }
@@ -238,11 +238,11 @@ mod tests {
     #[test]
     fn data_sets_are_found_one_folder_deep() {
         let data = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let folders = Folders { data: Some(data.parent().unwrap().to_owned()), document: data.into() };
+        let folders = InputFolders { data: Some(data.parent().unwrap().to_owned()), document: data.into() };
         assert_eq!(folders.data_set(Path::new("settings")).unwrap(), data.join("settings"));
         let found = folders.data_set(Path::new("gravity")).unwrap();
         assert_eq!(found, data.join("gravity"));
-        let deep = Folders { document: "elsewhere".into(), ..folders };
+        let deep = InputFolders { document: "elsewhere".into(), ..folders };
         assert!(deep.data_set(Path::new("slam")).unwrap().ends_with("slam"));
         assert!(deep.data_set(Path::new("semantics")).unwrap().ends_with("slam/semantics"));
     }

@@ -14,7 +14,7 @@
 //! - `covariances.json`, with `report.covariances`
 //!
 //! Each file is written completely or not at all, into an [`OutputFolder`].
-use crate::output::record::{FrameRecord, RECORD, RunRecord, VariantRecord};
+use crate::output::record::{FrameRecord, RECORD_FILE, RunRecord, VariantRecord};
 use crate::output::report::{RunReport, VariantReport};
 use manifactor_config::{Format, WriteError, to_toml, write_graph};
 use manifactor_formats::FormatError;
@@ -22,7 +22,7 @@ use manifactor_formats::table::TableError;
 use manifactor_formats::tum;
 use manifactor_formats::whole;
 use manifactor_mapping::estimate::Estimate;
-use manifactor_mapping::settings::run_document::{RunDocument, Variant, absolute, slug};
+use manifactor_mapping::settings::run_document::{RunDocument, RunVariant, absolute_path, slug};
 use manifactor_recording::recording;
 use manifactor_solve::{CovarianceError, IterationRecord};
 use serde::Serialize;
@@ -42,7 +42,7 @@ pub use map::{MapError, map_of};
 pub use own_map::refuse_own_maps;
 
 /// Name of the file with a variant's map.
-const MAP: &str = "map.json";
+const MAP_FILE: &str = "map.json";
 
 /// Error while writing results.
 #[derive(Debug, thiserror::Error)]
@@ -112,8 +112,8 @@ fn remove(path: &Path) -> Result<(), OutputError> {
 /// # Errors
 /// If a file cannot be written.
 pub fn write_report(output: &Path, report: &RunReport, record: &RunRecord) -> Result<(), OutputError> {
-    write_document(&output.join(RECORD), compact(record))?;
-    write_document(&output.join("report.json"), results(report))
+    write_document(&output.join(RECORD_FILE), format_compact(record))?;
+    write_document(&output.join("report.json"), format_results(report))
 }
 
 /// Writes all files of a variant into its folder, and returns the folder.
@@ -122,7 +122,7 @@ pub fn write_report(output: &Path, report: &RunReport, record: &RunRecord) -> Re
 /// If a file cannot be written; files written before it remain.
 pub fn write_variant(
     run: &RunDocument,
-    variant: &Variant,
+    variant: &RunVariant,
     estimate: &Estimate,
     report: &VariantReport,
     record: &VariantRecord,
@@ -137,23 +137,23 @@ pub fn write_variant(
     if report.association.is_some() {
         recording::write_detections(&estimate.sequence, &file("detections.csv"))?;
     }
-    write_document(&file("objects.json"), results(&report.objects))?;
+    write_document(&file("objects.json"), format_results(&report.objects))?;
     write_document(&file("frames.jsonl"), lines(&record.frames))?;
     let graph = write_graph(&estimate.mapping.graph, &estimate.solution.values, Format::Json);
     write_document(&file("graph.json"), graph)?;
     match map_of(estimate, &variant.settings) {
-        Ok(map) => write_document(&file(MAP), results(&map))?,
+        Ok(map) => write_document(&file(MAP_FILE), format_results(&map))?,
         Err(error) => {
-            tracing::warn!("there is no {MAP}: {error}");
+            tracing::warn!("there is no {MAP_FILE}: {error}");
             // an old file would be mistaken for the map of these results
-            remove(&file(MAP))?;
+            remove(&file(MAP_FILE))?;
         }
     }
     write_whole(&file("iterations.csv"), iterations(&estimate.solution.outcome.history))?;
-    write_document(&file("metrics.json"), results(report))?;
+    write_document(&file("metrics.json"), format_results(report))?;
     if variant.settings.report.covariances {
         let marginals = estimate.solution.marginals(&estimate.mapping.graph, &[])?;
-        write_document(&file("covariances.json"), results(&marginals))?;
+        write_document(&file("covariances.json"), format_results(&marginals))?;
     }
     Ok(folder)
 }
@@ -166,17 +166,17 @@ pub fn write_document(path: &Path, text: Result<String, WriteError>) -> Result<(
 
 /// Returns the frames as JSON, one per line.
 fn lines(frames: &[FrameRecord]) -> Result<String, WriteError> {
-    frames.iter().map(|frame| Ok(compact(frame)? + "\n")).collect()
+    frames.iter().map(|frame| Ok(format_compact(frame)? + "\n")).collect()
 }
 
 /// Returns results as readable JSON. Unlike documents, results may contain infinite numbers or NaN, such as a
 /// cost that overflows; these become null.
-pub fn results(value: &impl Serialize) -> Result<String, WriteError> {
+pub fn format_results(value: &impl Serialize) -> Result<String, WriteError> {
     serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(|error| inexpressible(&error))
 }
 
 /// Returns results as JSON on one line.
-fn compact(value: &impl Serialize) -> Result<String, WriteError> {
+fn format_compact(value: &impl Serialize) -> Result<String, WriteError> {
     serde_json::to_string(value).map_err(|error| inexpressible(&error))
 }
 
@@ -185,28 +185,28 @@ fn inexpressible(error: &serde_json::Error) -> WriteError {
 }
 
 /// Returns the settings of one variant as a separate document.
-fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> {
+fn resolved(run: &RunDocument, variant: &RunVariant) -> Result<String, WriteError> {
     #[derive(Serialize)]
-    struct Resolved<'a> {
+    struct ResolvedDocument<'a> {
         title: &'a str,
         output: String,
         folder: String,
         #[serde(flatten)]
-        settings: &'a manifactor_mapping::settings::Settings,
-        variants: [Named<'a>; 1],
+        settings: &'a manifactor_mapping::settings::RunSettings,
+        variants: [NamedVariant<'a>; 1],
     }
     #[derive(Serialize)]
-    struct Named<'a> {
+    struct NamedVariant<'a> {
         name: &'a str,
         #[serde(skip_serializing_if = "Option::is_none")]
         about: Option<&'a str>,
     }
     // a document cannot represent names that are not UTF-8
     let output = variant_folder(&run.output, &variant.name).display().to_string();
-    let folder = absolute(&run.folder).display().to_string();
-    let variants = [Named { name: &variant.name, about: variant.about.as_deref() }];
+    let folder = absolute_path(&run.folder).display().to_string();
+    let variants = [NamedVariant { name: &variant.name, about: variant.about.as_deref() }];
     let title = &run.title;
-    to_toml(&Resolved { title, output, folder, settings: &variant.settings, variants })
+    to_toml(&ResolvedDocument { title, output, folder, settings: &variant.settings, variants })
 }
 
 fn iterations(history: &[IterationRecord]) -> String {

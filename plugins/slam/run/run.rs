@@ -1,16 +1,16 @@
 //! Execution of a run document, up to its report.
-use crate::output::report::{AssociationReport, Found, HeldOutReport, RunReport, VariantReport};
-use association::{Associated, associated};
-use location::find;
+use crate::output::report::{AssociationReport, FoundStart, HeldOutReport, RunReport, VariantReport};
+use association::{AssociatedSequence, associate_sequence};
+use location::find_start;
 use manifactor_formats::journal::JournalError;
 use manifactor_mapping::estimate::{Estimate, EstimateError};
 use manifactor_mapping::mapping::{Mapping, MappingError};
-use manifactor_mapping::settings::Settings;
-use manifactor_mapping::settings::run_document::{RunDocument, Variant};
+use manifactor_mapping::settings::RunSettings;
+use manifactor_mapping::settings::run_document::{RunDocument, RunVariant};
 use manifactor_online::FinishError;
 use manifactor_recording::journal::journaled;
 use manifactor_recording::sequence::{Detection, Sequence};
-use manifactor_recording::source::{Folders, SourceError};
+use manifactor_recording::source::{InputFolders, SourceError};
 use manifactor_solve::{Observer, Termination};
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ mod association;
 mod location;
 mod stream;
 
-pub use stream::{Watch, online};
+pub use stream::{StreamWatcher, online};
 
 /// Reason why a variant could not be run.
 #[derive(Debug, thiserror::Error)]
@@ -60,22 +60,22 @@ pub enum RunError {
 
 /// A sequence with its graph, before the solve.
 #[derive(Debug)]
-pub struct Mapped<'a> {
+pub struct MappedSequence<'a> {
     /// The sequence with the assigned objects of its boxes.
     pub sequence: Arc<Sequence>,
     /// The graph.
     pub mapping: Mapping,
     /// The settings of the graph. If the start pose in a prior map was found, they include it.
-    pub settings: Cow<'a, Settings>,
+    pub settings: Cow<'a, RunSettings>,
     /// Report of the data association.
     pub association: Option<AssociationReport>,
     /// The start pose in the prior map, if it was searched and found.
-    pub found: Option<Found>,
+    pub found: Option<FoundStart>,
     /// Boxes that were held out of the graph for evaluation.
     pub held_out: Vec<Detection>,
 }
 
-impl<'a> Mapped<'a> {
+impl<'a> MappedSequence<'a> {
     /// Finds the start pose in the prior map of the settings, assigns the boxes to objects, and creates the
     /// graph.
     ///
@@ -83,17 +83,18 @@ impl<'a> Mapped<'a> {
     /// If the graph cannot be created.
     pub fn new(
         sequence: Arc<Sequence>,
-        settings: &'a Settings,
+        settings: &'a RunSettings,
         observer: &mut dyn Observer,
     ) -> Result<Self, RunError> {
-        let found = find(&sequence, settings, observer)?;
+        let found = find_start(&sequence, settings, observer)?;
         let settings = match &found {
-            Some(Found { located, .. }) => {
-                Cow::Owned(settings.beginning_at(located.start, located.noise.clone()))
+            Some(FoundStart { located, .. }) => {
+                Cow::Owned(settings.with_start(located.start, located.noise.clone()))
             }
             None => Cow::Borrowed(settings),
         };
-        let Associated { mut sequence, report: association } = associated(sequence, &settings, observer)?;
+        let AssociatedSequence { mut sequence, report: association } =
+            associate_sequence(sequence, &settings, observer)?;
         let held_out = match settings.evaluation.holdout {
             Some(holdout) => holdout.take_from(Arc::make_mut(&mut sequence)),
             None => vec![],
@@ -110,17 +111,17 @@ impl<'a> Mapped<'a> {
 pub fn estimate(
     name: &str,
     sequence: Arc<Sequence>,
-    settings: &Settings,
+    settings: &RunSettings,
     observer: &mut dyn Observer,
 ) -> Result<(Estimate, VariantReport), RunError> {
     let clock = Instant::now();
-    let Mapped { sequence, mapping, settings: begun, association, found, held_out } =
-        Mapped::new(sequence, settings, observer)?;
+    let MappedSequence { sequence, mapping, settings: begun, association, found, held_out } =
+        MappedSequence::new(sequence, settings, observer)?;
     let estimate = Estimate::new(sequence, mapping, &begun, observer)?;
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.association = association;
     report.held_out = HeldOutReport::new(&estimate, &held_out, settings);
-    report.tell_prior_map(&estimate, settings, found);
+    report.set_prior_map_report(&estimate, settings, found);
     report.seconds = clock.elapsed().as_secs_f64();
     Ok((estimate, report))
 }
@@ -130,7 +131,7 @@ pub fn estimate(
 pub struct Run<'a> {
     /// The run document.
     pub document: &'a RunDocument,
-    folders: Folders,
+    folders: InputFolders,
     loaded: Vec<(String, Arc<Sequence>)>,
     journal: Option<PathBuf>,
     began: Instant,
@@ -140,12 +141,12 @@ pub struct Run<'a> {
 impl<'a> Run<'a> {
     /// Starts a run. `data` is the folder of public data sets.
     pub fn new(document: &'a RunDocument, data: Option<PathBuf>) -> Self {
-        let folders = Folders { data, document: document.folder.clone() };
+        let folders = InputFolders { data, document: document.folder.clone() };
         Self { document, folders, loaded: vec![], journal: None, began: Instant::now(), reports: vec![] }
     }
 
     /// Keeps the frames of a stream in a file, and begins with those that it has; see [`journal`](manifactor_recording::journal).
-    pub fn keep_frames(&mut self, journal: PathBuf) {
+    pub fn journal_frames(&mut self, journal: PathBuf) {
         self.journal = Some(journal);
     }
 
@@ -153,7 +154,7 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// If its source has no sequence.
-    pub fn sequence(&mut self, variant: &Variant) -> Result<Arc<Sequence>, SourceError> {
+    pub fn sequence(&mut self, variant: &RunVariant) -> Result<Arc<Sequence>, SourceError> {
         let source = &variant.settings.source;
         // sources with equal settings are equal
         let name = serde_json::to_string(source).unwrap_or_default();
@@ -171,25 +172,25 @@ impl<'a> Run<'a> {
     /// # Errors
     /// If there is no data, or the graph cannot be created. Numerical problems are not errors: see the
     /// report.
-    pub fn variant(
+    pub fn run_variant(
         &mut self,
-        variant: &Variant,
+        variant: &RunVariant,
         observer: &mut dyn Observer,
     ) -> Result<(Estimate, VariantReport), RunError> {
         let clock = Instant::now();
         let sequence = self.sequence(variant)?;
         let done = estimate(&variant.name, sequence, &variant.settings, observer)?;
-        Ok(self.keep(variant, done, clock))
+        Ok(self.journal_stream(variant, done, clock))
     }
 
     /// Runs one variant frame by frame; see [`online`].
     ///
     /// # Errors
     /// If there is no data, or the graph cannot be created.
-    pub fn variant_online(
+    pub fn run_variant_online(
         &mut self,
-        variant: &Variant,
-        watch: &mut dyn Watch,
+        variant: &RunVariant,
+        watch: &mut dyn StreamWatcher,
         observer: &mut dyn Observer,
     ) -> Result<(Estimate, VariantReport), RunError> {
         let clock = Instant::now();
@@ -203,12 +204,12 @@ impl<'a> Run<'a> {
             None => stream,
         };
         let done = online(&variant.name, stream, &variant.settings, watch, observer)?;
-        Ok(self.keep(variant, done, clock))
+        Ok(self.journal_stream(variant, done, clock))
     }
 
-    fn keep(
+    fn journal_stream(
         &mut self,
-        variant: &Variant,
+        variant: &RunVariant,
         (estimate, mut report): (Estimate, VariantReport),
         clock: Instant,
     ) -> (Estimate, VariantReport) {

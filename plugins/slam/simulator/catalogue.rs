@@ -2,7 +2,7 @@
 use super::solid::Solid;
 
 /// A class with its solid. In the usual resting position z points up.
-pub(super) struct Kind {
+pub(super) struct ObjectKind {
     pub class: &'static str,
     pub solid: fn() -> Solid,
 }
@@ -10,7 +10,7 @@ pub(super) struct Kind {
 macro_rules! kinds {
     ($($class:literal => $solid:expr),+ $(,)?) => {
         /// COCO's class names, as in recorded detections, with typical sizes in metres.
-        pub(super) const KINDS: &[Kind] = &[$(Kind { class: $class, solid: || $solid }),+];
+        pub(super) const KINDS: &[ObjectKind] = &[$(ObjectKind { class: $class, solid: || $solid }),+];
     };
 }
 kinds! {
@@ -34,6 +34,6 @@ kinds! {
 }
 
 /// Returns the solid of a class.
-pub(super) fn kind(class: &str) -> Option<&'static Kind> {
+pub(super) fn kind(class: &str) -> Option<&'static ObjectKind> {
     KINDS.iter().find(|kind| kind.class == class)
 }

@@ -6,7 +6,7 @@ use manifactor_formats::tum::StampedPose;
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::Camera;
 use manifactor_recording::sequence::{Acceleration, Frame, GroundTruth, Sequence};
-use manifactor_recording::source::{Folders, Source, SourceError};
+use manifactor_recording::source::{InputFolders, SequenceSource, SourceError};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use schemars::JsonSchema;
@@ -23,12 +23,12 @@ mod scene;
 mod solid;
 mod trajectory;
 
-pub use noise::{AccelerometerNoise, Detector, MotionNoise, Spread};
+pub use noise::{AccelerometerNoise, DetectorSettings, MotionNoise, NoiseSpread};
 pub use scene::{SceneObject, SceneSettings};
-pub use solid::{Boxes, Solid};
+pub use solid::{ImageBoxes, Solid};
 pub use trajectory::TrajectorySettings;
 
-use detection::Errors;
+use detection::DetectorErrors;
 
 /// Simulated scene, trajectory and detector.
 ///
@@ -43,7 +43,8 @@ use detection::Errors;
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Simulated {
+#[schemars(rename = "Simulated")]
+pub struct SimulatedSource {
     /// Seed of all noise.
     pub seed: u64,
     /// The camera. Default: the camera of the paper.
@@ -55,13 +56,13 @@ pub struct Simulated {
     /// Noise of the odometry.
     pub odometry: MotionNoise,
     /// Noise of boxes and classes.
-    pub detector: Detector,
+    pub detector: DetectorSettings,
     /// Accelerometer in the camera frame with one reading for each image. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accelerometer: Option<AccelerometerNoise>,
 }
 
-impl Default for Simulated {
+impl Default for SimulatedSource {
     fn default() -> Self {
         let camera =
             Camera { fx: 320.0, fy: 320.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 };
@@ -71,7 +72,7 @@ impl Default for Simulated {
             scene: SceneSettings::default(),
             trajectory: TrajectorySettings::default(),
             odometry: MotionNoise::default(),
-            detector: Detector::default(),
+            detector: DetectorSettings::default(),
             accelerometer: None,
         }
     }
@@ -99,7 +100,7 @@ pub enum SimulationError {
     },
 }
 
-impl Simulated {
+impl SimulatedSource {
     /// Runs the simulation.
     ///
     /// # Errors
@@ -121,7 +122,7 @@ impl Simulated {
         for (i, pose) in poses.iter().enumerate() {
             let world_from_camera = match (i.checked_sub(1).map(|j| &poses[j]), frames.last()) {
                 (Some(before), Some(last)) => {
-                    let measured = self.odometry.corrupt(&before.between(pose), &mut motion);
+                    let measured = self.odometry.add_noise(&before.between(pose), &mut motion);
                     last.world_from_camera.compose(&measured)
                 }
                 _ => *pose,
@@ -131,9 +132,9 @@ impl Simulated {
         let stamped = |(i, pose): (usize, &_)| StampedPose { timestamp: time(i), pose: *pose };
         let [mut imagination, mistakes, mut felt, depths] = [(); 4].map(|()| Pcg64::from_rng(&mut noise));
         let count = scene.objects.len();
-        let before = Errors::new(count, boxes, mistakes, depths);
+        let before = DetectorErrors::new(count, boxes, mistakes, depths);
         let [boxes, mistakes, depths] = [(); 3].map(|()| Pcg64::from_rng(&mut noise));
-        let after = Errors::new(count, boxes, mistakes, depths);
+        let after = DetectorErrors::new(count, boxes, mistakes, depths);
         let detections = self.detect(&scene, &poses, [before, after], &mut imagination);
         let readings = self.accelerometer.as_ref().map(|sensor| {
             let readings = sensor.read(&poses, *self.trajectory.interval, &mut felt).into_iter().enumerate();
@@ -141,7 +142,7 @@ impl Simulated {
         });
         let truth = GroundTruth {
             trajectory: poses.iter().enumerate().map(stamped).collect(),
-            objects: scene.truth(time(poses.len() - 1)),
+            objects: scene.true_objects(time(poses.len() - 1)),
         };
         Ok(Sequence {
             camera: self.camera,
@@ -156,12 +157,12 @@ impl Simulated {
 }
 
 #[typetag::serialize(name = "simulated")]
-impl Source for Simulated {
-    fn load(&self, _: &Folders) -> Result<Sequence, SourceError> {
+impl SequenceSource for SimulatedSource {
+    fn load(&self, _: &InputFolders) -> Result<Sequence, SourceError> {
         self.simulate().map_err(|e| SourceError::Simulation(e.to_string()))
     }
 }
-register!(dyn Source, "simulated", Simulated);
+register!(dyn SequenceSource, "simulated", SimulatedSource);
 
 #[cfg(test)]
 mod tests {
@@ -172,10 +173,10 @@ mod tests {
 
     #[test]
     fn the_same_settings_give_the_same_bits() {
-        let [a, b] = [(); 2].map(|()| Simulated::default().simulate().unwrap());
+        let [a, b] = [(); 2].map(|()| SimulatedSource::default().simulate().unwrap());
         assert_eq!((a.frames, a.detections), (b.frames, b.detections));
-        let other = Simulated { seed: 2, ..Simulated::default() }.simulate().unwrap();
-        let again = Simulated::default().simulate().unwrap();
+        let other = SimulatedSource { seed: 2, ..SimulatedSource::default() }.simulate().unwrap();
+        let again = SimulatedSource::default().simulate().unwrap();
         assert_ne!(other.frames, again.frames);
         assert_eq!(other.ground_truth.unwrap().objects, again.ground_truth.unwrap().objects);
     }
@@ -183,7 +184,7 @@ mod tests {
     #[test]
     fn the_noise_of_another_trajectory_is_another() {
         let turns = |seed| {
-            let mut settings = Simulated::default();
+            let mut settings = SimulatedSource::default();
             settings.trajectory.seed = seed;
             let sequence = settings.simulate().unwrap();
             let truth = sequence.ground_truth.unwrap().trajectory;
@@ -204,7 +205,7 @@ mod tests {
 
     #[test]
     fn without_noise_all_is_as_it_is() {
-        let mut settings = Simulated::default();
+        let mut settings = SimulatedSource::default();
         settings.odometry = MotionNoise {
             translation: NotNegative::literal(0.0),
             rotation: NotNegative::literal(0.0),
@@ -225,7 +226,7 @@ mod tests {
 
     #[test]
     fn noise_is_as_large_as_it_says() {
-        let mut settings = Simulated::default();
+        let mut settings = SimulatedSource::default();
         settings.trajectory.frames = Count::literal(4000);
         let sequence = settings.simulate().unwrap();
         let truth = sequence.ground_truth.unwrap().trajectory;
@@ -245,7 +246,7 @@ mod tests {
 
     #[test]
     fn each_object_rests_on_the_plane_and_is_seen() {
-        let mut settings = Simulated::default();
+        let mut settings = SimulatedSource::default();
         settings.scene.tilted = Share::literal(0.5);
         settings.scene.height = Finite::literal(0.7);
         let sequence = settings.simulate().unwrap();
@@ -260,8 +261,8 @@ mod tests {
 
     #[test]
     fn rates_are_kept() {
-        let count = |change: fn(&mut Detector)| {
-            let mut settings = Simulated::default();
+        let count = |change: fn(&mut DetectorSettings)| {
+            let mut settings = SimulatedSource::default();
             change(&mut settings.detector);
             settings.simulate().unwrap().detections.len() as f64
         };
@@ -274,7 +275,7 @@ mod tests {
     #[test]
     fn what_others_hide_is_seen_less_and_no_other_box_changes() {
         let boxes = |hide| {
-            let mut settings = Simulated::default();
+            let mut settings = SimulatedSource::default();
             settings.detector.occluded_by_objects = hide;
             let detections = settings.simulate().unwrap().detections.into_iter();
             detections.map(|d| ((d.frame, d.object), d.bounding_box)).collect::<BTreeMap<_, _>>()
@@ -288,7 +289,7 @@ mod tests {
 
     #[test]
     fn boxes_of_a_wrong_object_are_as_many_as_said() {
-        let mut settings = Simulated::default();
+        let mut settings = SimulatedSource::default();
         let right = settings.simulate().unwrap().detections;
         settings.detector.wrong_object = Share::literal(0.2);
         let wrong = settings.simulate().unwrap().detections;
@@ -302,7 +303,7 @@ mod tests {
     #[test]
     fn an_accelerometer_feels_up_and_its_own_motion() {
         let sensor = AccelerometerNoise { sigma: NotNegative::literal(0.0), bias: NotNegative::literal(0.0) };
-        let settings = Simulated { accelerometer: Some(sensor), ..Simulated::default() };
+        let settings = SimulatedSource { accelerometer: Some(sensor), ..SimulatedSource::default() };
         let sequence = settings.simulate().unwrap();
         let truth = &sequence.ground_truth.as_ref().unwrap().trajectory;
         assert_eq!(sequence.accelerometer.len(), truth.len());
@@ -310,7 +311,7 @@ mod tests {
             let felt = pose.pose.rotation.act(&reading.acceleration);
             assert!((felt - Vector3::z() * 9.81).norm() < 1.5, "{felt}");
         }
-        let before = Simulated::default().simulate().unwrap();
+        let before = SimulatedSource::default().simulate().unwrap();
         assert_eq!(sequence.detections, before.detections);
         let mut two = settings;
         two.trajectory.frames = Count::literal(2);
@@ -321,8 +322,9 @@ mod tests {
 
     #[test]
     fn settings_that_make_no_sense_are_refused() {
-        let read =
-            |settings: &str| serde_json::from_str::<Simulated>(settings).map_err(|error| error.to_string());
+        let read = |settings: &str| {
+            serde_json::from_str::<SimulatedSource>(settings).map_err(|error| error.to_string())
+        };
         for (settings, expected) in [
             (r#"{"scene": {"tilted": 1.5}}"#, "from 0 to 1, got 1.5"),
             (r#"{"scene": {"moved_at_s": -1}}"#, "0 or more, got -1"),

@@ -21,17 +21,17 @@ pub(super) struct Scene {
 
 impl Scene {
     /// Returns an object after its move, if it has been moved by this time.
-    pub(super) fn moved(&self, object: usize, time: f64) -> Option<&SceneObject> {
+    pub(super) fn moved_object(&self, object: usize, time: f64) -> Option<&SceneObject> {
         self.moved.get(&object).filter(|_| time >= self.moved_at_s)
     }
 
     /// Returns an object as it is at a time.
-    pub(super) fn at(&self, object: usize, time: f64) -> &SceneObject {
-        self.moved(object, time).unwrap_or(&self.objects[object])
+    pub(super) fn object_at(&self, object: usize, time: f64) -> &SceneObject {
+        self.moved_object(object, time).unwrap_or(&self.objects[object])
     }
 
     /// Returns the true objects that exist between time 0 and `last`, sorted by number.
-    pub(super) fn truth(self, last: f64) -> Vec<TrueObject> {
+    pub(super) fn true_objects(self, last: f64) -> Vec<TrueObject> {
         let Self { objects, moved, moved_at_s } = self;
         let is_there = |i: &usize| moved_at_s > 0.0 || !moved.contains_key(i);
         let stay = objects.into_iter().enumerate().filter(|(i, _)| is_there(i)).map(|(_, object)| object);
@@ -52,7 +52,7 @@ impl SceneSettings {
         let (mut left, mut moved): (Vec<usize>, _) = ((0..objects.len()).collect(), BTreeMap::new());
         for id in objects.len()..objects.len() + (*self.moved * objects.len() as f64).round() as usize {
             let object = left.swap_remove(rng.random_range(0..left.len()));
-            let elsewhere = self.elsewhere(&objects[object], id, &placed, &mut rng)?;
+            let elsewhere = self.move_object(&objects[object], id, &placed, &mut rng)?;
             placed[object] = footprint(&elsewhere);
             moved.insert(object, elsewhere);
         }
@@ -61,7 +61,7 @@ impl SceneSettings {
 
     /// Returns the object with a new number, at a place apart from all objects and from its own place, turned
     /// about the vertical.
-    fn elsewhere(
+    fn move_object(
         &self,
         object: &SceneObject,
         id: usize,
@@ -71,7 +71,7 @@ impl SceneSettings {
         let no_room = SimulationError::NoRoom { object: id };
         let turn = So3::exp(&(Vector3::z() * (rng.random::<f64>() * TAU)));
         let (_, radius) = footprint(object);
-        let place = self.place(radius, placed, rng).ok_or_else(|| no_room.clone())?;
+        let place = self.free_place(radius, placed, rng).ok_or_else(|| no_room.clone())?;
         let before = &object.truth.world_from_object;
         let translation = place + Vector3::z() * before.translation.z;
         let world_from_object = Se3::new(turn.compose(&before.rotation), translation);
@@ -93,14 +93,14 @@ fn footprint(object: &SceneObject) -> (Vector3<f64>, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Simulated;
+    use super::super::SimulatedSource;
     use super::*;
     use manifactor_graph::checked::{NotNegative, Share};
     use manifactor_recording::sequence::{Detection, Sequence};
 
     /// Returns settings that move a third of the objects after 10 of 20 seconds.
-    fn moving() -> Simulated {
-        let mut settings = Simulated::default();
+    fn moving() -> SimulatedSource {
+        let mut settings = SimulatedSource::default();
         settings.scene.area = [NotNegative::literal(3.0), NotNegative::literal(2.4)];
         settings.scene.moved = Share::literal(1.0 / 3.0);
         settings.scene.moved_at_s = NotNegative::literal(10.0);
@@ -109,7 +109,7 @@ mod tests {
         settings
     }
 
-    fn still(settings: &Simulated) -> Simulated {
+    fn still(settings: &SimulatedSource) -> SimulatedSource {
         let mut settings = settings.clone();
         settings.scene.moved = Share::literal(0.0);
         settings
@@ -134,7 +134,7 @@ mod tests {
                 let [(a, r), (b, s)] = [a, b].map(footprint);
                 (a - b).norm() - r - s > *settings.gap - 1e-9
             };
-            let all: Vec<_> = (0..15).map(|i| scene.at(i, 0.0)).collect();
+            let all: Vec<_> = (0..15).map(|i| scene.object_at(i, 0.0)).collect();
             for (i, object) in all.iter().enumerate() {
                 assert!(all[..i].iter().all(|other| apart(object, other)), "{seed}");
                 let (place, _) = footprint(object);
@@ -189,9 +189,9 @@ mod tests {
 
     #[test]
     fn what_is_as_usual_is_not_written() {
-        let text = serde_json::to_string(&Simulated::default()).unwrap();
+        let text = serde_json::to_string(&SimulatedSource::default()).unwrap();
         assert!(!text.contains("moved"), "{text}");
         let text = serde_json::to_string(&moving()).unwrap();
-        assert_eq!(serde_json::from_str::<Simulated>(&text).unwrap(), moving());
+        assert_eq!(serde_json::from_str::<SimulatedSource>(&text).unwrap(), moving());
     }
 }

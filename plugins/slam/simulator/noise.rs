@@ -3,7 +3,7 @@ use manifactor_geometry::Se3;
 use manifactor_graph::Manifold;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_quadric::{BoundingBox, Camera};
-use manifactor_recording::measurement::{Depth, Quantities};
+use manifactor_recording::measurement::{DepthMeasurement, Quantities};
 use manifactor_recording::sequence::ClassScores;
 use nalgebra::{Vector3, Vector6};
 use rand::RngExt;
@@ -25,7 +25,7 @@ pub struct MotionNoise {
     pub rotation: NotNegative,
     /// Length that the shares refer to: the length of the motion, for the whole error or for each axis, or
     /// the component of the motion along each axis.
-    pub spread: Spread,
+    pub spread: NoiseSpread,
 }
 
 impl Default for MotionNoise {
@@ -33,7 +33,7 @@ impl Default for MotionNoise {
         Self {
             translation: NotNegative::literal(0.05),
             rotation: NotNegative::literal(0.15),
-            spread: Spread::default(),
+            spread: NoiseSpread::default(),
         }
     }
 }
@@ -41,7 +41,8 @@ impl Default for MotionNoise {
 /// Reference of the shares of a motion's noise.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Spread {
+#[schemars(rename = "Spread")]
+pub enum NoiseSpread {
     /// The length of the motion gives the whole error: each axis has the share / √3.
     #[default]
     Total,
@@ -57,7 +58,7 @@ fn normal(rng: &mut Pcg64) -> f64 {
 
 impl MotionNoise {
     /// Returns a relative pose with noise.
-    pub(super) fn corrupt(&self, motion: &Se3, rng: &mut Pcg64) -> Se3 {
+    pub(super) fn add_noise(&self, motion: &Se3, rng: &mut Pcg64) -> Se3 {
         let turn = self.sigmas(&motion.rotation.log(), *self.rotation);
         let shift = self.sigmas(&motion.translation, *self.translation);
         let sigmas = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
@@ -65,9 +66,9 @@ impl MotionNoise {
     }
     fn sigmas(&self, motion: &Vector3<f64>, share: f64) -> Vector3<f64> {
         match self.spread {
-            Spread::Total => Vector3::repeat(share * motion.norm() / 3.0_f64.sqrt()),
-            Spread::PerAxis => Vector3::repeat(share * motion.norm()),
-            Spread::Component => motion.abs() * share,
+            NoiseSpread::Total => Vector3::repeat(share * motion.norm() / 3.0_f64.sqrt()),
+            NoiseSpread::PerAxis => Vector3::repeat(share * motion.norm()),
+            NoiseSpread::Component => motion.abs() * share,
         }
     }
 }
@@ -113,7 +114,8 @@ impl AccelerometerNoise {
 /// A detector and its errors. Shares and rates are from 0 to 1.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Detector {
+#[schemars(rename = "Detector")]
+pub struct DetectorSettings {
     /// Standard deviation of each side of a box. The paper gives a variance of 4 px², and its authors' code
     /// draws with 2 px, which is equal. Unit: pixels.
     pub sigma_px: NotNegative,
@@ -149,7 +151,7 @@ pub struct Detector {
     pub depth_error: Option<Positive>,
 }
 
-impl Default for Detector {
+impl Default for DetectorSettings {
     fn default() -> Self {
         Self {
             sigma_px: NotNegative::literal(2.0),
@@ -170,11 +172,11 @@ impl Default for Detector {
     }
 }
 
-impl Detector {
+impl DetectorSettings {
     /// Returns the detected box; `None` if the object is not detected. `visible` is the visible share of the
     /// object. `noise` is the noise of its previous box in standard deviations, and is updated to this box;
     /// `seconds` have passed in between.
-    pub(super) fn draw(
+    pub(super) fn draw_box(
         &self,
         bounding_box: &BoundingBox,
         visible: f64,
@@ -209,25 +211,25 @@ impl Detector {
     }
 
     /// Returns the detected class of an object whose usual class is `usual`.
-    pub(super) fn classify(&self, usual: &str, classes: &[&str], rng: &mut Pcg64) -> ClassScores {
+    pub(super) fn draw_class(&self, usual: &str, classes: &[&str], rng: &mut Pcg64) -> ClassScores {
         let (confused, score) = (rng.random_bool(*self.confused), rng.random_range(0.5..1.0));
-        let other = another(usual, classes, rng);
+        let other = draw_different_class(usual, classes, rng);
         ClassScores::single(if confused { other } else { usual }, score)
     }
 }
 
-impl Detector {
+impl DetectorSettings {
     /// Returns the measurements besides the box, of an object at this depth in metres: its depth, if it is in
     /// front of the camera.
-    pub(super) fn measure(&self, depth: f64, rng: &mut Pcg64) -> Quantities {
+    pub(super) fn draw_measurements(&self, depth: f64, rng: &mut Pcg64) -> Quantities {
         let Some(relative) = self.depth_error else { return Quantities::NONE };
         let error = relative.get() * normal(rng);
         let measured = Positive::new(depth * (1.0 + error));
-        measured.map_or(Quantities::NONE, |measured| Quantities::one(Depth(measured)))
+        measured.map_or(Quantities::NONE, |measured| Quantities::one(DepthMeasurement(measured)))
     }
 
     /// Returns the false boxes of an image.
-    pub(super) fn imagine(
+    pub(super) fn draw_false_boxes(
         &self,
         camera: &Camera,
         classes: &[&str],
@@ -250,13 +252,13 @@ impl Detector {
 }
 
 /// Returns the object that a box is assigned to, out of `objects`: a wrong one at this rate.
-pub(super) fn mistaken(rate: f64, own: usize, objects: usize, rng: &mut Pcg64) -> usize {
+pub(super) fn draw_assigned_object(rate: f64, own: usize, objects: usize, rng: &mut Pcg64) -> usize {
     let (wrong, step) = (rng.random_bool(rate), rng.random_range(1..objects.max(2)));
     if wrong { (own + step) % objects.max(1) } else { own }
 }
 
 /// Returns a different class, if there is one.
-pub(super) fn another<'a>(class: &'a str, classes: &[&'a str], rng: &mut Pcg64) -> &'a str {
+pub(super) fn draw_different_class<'a>(class: &'a str, classes: &[&'a str], rng: &mut Pcg64) -> &'a str {
     let others: Vec<&str> = classes.iter().copied().filter(|c| *c != class).collect();
     let i = rng.random_range(0..others.len().max(1));
     others.get(i).copied().unwrap_or(class)

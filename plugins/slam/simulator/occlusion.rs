@@ -5,7 +5,7 @@ use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::{Vector2, Vector3};
 
 /// Side of a cell in pixels, unless this gives more than `MOST_CELLS` along a side of the image.
-const CELL: f64 = 4.0;
+const CELL_PX: f64 = 4.0;
 const MOST_CELLS: f64 = 1000.0;
 
 /// The nearest object in each cell of an image.
@@ -24,7 +24,7 @@ impl DepthImage {
     /// Draws all solids, each with its pose in the camera frame.
     pub(super) fn new<'a>(solids: impl Iterator<Item = (&'a Solid, Se3)>, camera: &Camera) -> Self {
         let size = camera.size();
-        let cell = CELL.max(size.max() / MOST_CELLS);
+        let cell = CELL_PX.max(size.max() / MOST_CELLS);
         let [columns, rows] = [size.x, size.y].map(|length| (length / cell).ceil() as usize);
         let mut image = Self {
             cell,
@@ -36,7 +36,7 @@ impl DepthImage {
         for (object, (solid, camera_from_object)) in solids.enumerate() {
             let mut covered = vec![];
             for face in solid.in_front(&camera_from_object) {
-                image.draw(&face, camera, |cell, nearest, depth| {
+                image.visit_cells(&face, camera, |cell, nearest, depth| {
                     covered.push(cell);
                     if depth < nearest.0 {
                         *nearest = (depth, object);
@@ -51,7 +51,7 @@ impl DepthImage {
     }
 
     /// Visits the cells of a face, with its depth in each cell.
-    fn draw(
+    fn visit_cells(
         &mut self,
         face: &[Vector3<f64>],
         camera: &Camera,
@@ -87,7 +87,11 @@ impl DepthImage {
 
     /// Returns the box of an object, reduced to the visible part, and the visible share; `None` if nothing is
     /// visible. An object smaller than a cell keeps its box.
-    pub(super) fn left_of(&self, object: usize, bounding_box: BoundingBox) -> Option<(BoundingBox, f64)> {
+    pub(super) fn visible_part(
+        &self,
+        object: usize,
+        bounding_box: BoundingBox,
+    ) -> Option<(BoundingBox, f64)> {
         let covered = self.covered.get(object)?;
         if covered.is_empty() {
             return Some((bounding_box, 1.0));
@@ -130,17 +134,17 @@ mod tests {
         Solid::cuboid(*size).boxes(&pose, &CAMERA, &Se3::identity()).unwrap().whole
     }
 
-    fn seen(objects: &[([f64; 3], [f64; 3])]) -> Vec<Option<(BoundingBox, f64)>> {
+    fn visible_boxes(objects: &[([f64; 3], [f64; 3])]) -> Vec<Option<(BoundingBox, f64)>> {
         let solids: Vec<_> = objects.iter().map(|(size, _)| Solid::cuboid(*size)).collect();
         let at = |(_, at): &([f64; 3], [f64; 3])| Se3::new(So3::identity(), Vector3::from(*at));
         let image = DepthImage::new(solids.iter().zip(objects.iter().map(at)), &CAMERA);
-        (0..solids.len()).map(|i| image.left_of(i, whole(&objects[i]))).collect()
+        (0..solids.len()).map(|i| image.visible_part(i, whole(&objects[i]))).collect()
     }
 
     #[test]
     fn alone_it_is_seen_as_it_is() {
         let sheet = ([0.4, 0.4, 0.1], [0.0, 0.0, 2.0]);
-        assert_eq!(seen(&[sheet])[0], Some((whole(&sheet), 1.0)));
+        assert_eq!(visible_boxes(&[sheet])[0], Some((whole(&sheet), 1.0)));
     }
 
     #[test]
@@ -154,13 +158,13 @@ mod tests {
     fn what_is_behind_ends_where_the_other_begins() {
         // the nearer sheet, at 0.95 m, covers x > 320 px
         let sheet = ([0.4, 0.4, 0.1], [0.0, 0.0, 2.0]);
-        let found = seen(&[sheet, ([1.0, 1.0, 0.1], [0.5, 0.0, 1.0])]);
+        let found = visible_boxes(&[sheet, ([1.0, 1.0, 0.1], [0.5, 0.0, 1.0])]);
         let (behind, share) = found[0].unwrap();
-        assert!((behind.xmax - 320.0).abs() <= CELL, "{behind:?}");
+        assert!((behind.xmax - 320.0).abs() <= CELL_PX, "{behind:?}");
         assert_eq!(behind.xmin, whole(&sheet).xmin);
         assert!((share - 0.5).abs() < 0.05, "{share}");
         assert_eq!(found[1].unwrap().1, 1.0);
         // in the middle it covers everything
-        assert!(seen(&[sheet, ([1.0, 1.0, 0.1], [0.0, 0.0, 1.0])])[0].is_none());
+        assert!(visible_boxes(&[sheet, ([1.0, 1.0, 0.1], [0.0, 0.0, 1.0])])[0].is_none());
     }
 }

@@ -3,12 +3,14 @@ use super::*;
 use manifactor_graph::checked::{Count, NotNegative, Positive};
 use manifactor_recording::recording::write;
 use manifactor_recording::sequence::ClassScores;
-use manifactor_recording::source::{CameraChoice, Folders, JsonLines, Recorded, Source, line};
+use manifactor_recording::source::{
+    CameraChoice, InputFolders, JsonLines, RecordedFiles, SequenceSource, format_line,
+};
 use serde_json::json;
 
 #[test]
 fn a_written_recording_is_read_back() {
-    let mut settings = Simulated::default();
+    let mut settings = SimulatedSource::default();
     settings.trajectory.frames = Count::literal(30);
     settings.detector.false_boxes = NotNegative::literal(0.2);
     settings.detector.depth_error = Some(Positive::literal(0.02));
@@ -19,9 +21,10 @@ fn a_written_recording_is_read_back() {
     let folder = folder.path();
     write(&sequence, folder).unwrap();
     let camera = serde_json::to_value(sequence.camera).unwrap();
-    let recorded: Recorded = serde_json::from_value(json!({ "folder": folder, "camera": camera })).unwrap();
+    let recorded: RecordedFiles =
+        serde_json::from_value(json!({ "folder": folder, "camera": camera })).unwrap();
     assert!(matches!(recorded.camera, CameraChoice::Pinhole(camera) if camera == sequence.camera));
-    let read = recorded.load(&Folders::default()).unwrap();
+    let read = recorded.load(&InputFolders::default()).unwrap();
     assert_eq!((read.frames.len(), read.detections.len()), (30, sequence.detections.len()));
     for (a, b) in read.detections.iter().zip(&sequence.detections) {
         assert_eq!((a.frame, a.object, &a.scores), (b.frame, b.object, &b.scores));
@@ -32,21 +35,21 @@ fn a_written_recording_is_read_back() {
     let nothing = json!([{ "id": 1, "class": "cup", "world_from_object": truth.objects[0].world_from_object,
         "half_extents": [0.1, 0.0, 0.1], "bounding_box": truth.objects[0].bounding_box }]);
     std::fs::write(folder.join("objects.json"), nothing.to_string()).unwrap();
-    let error = recorded.load(&Folders::default()).unwrap_err().to_string();
+    let error = recorded.load(&InputFolders::default()).unwrap_err().to_string();
     assert!(error.contains("object 1: half_extents must be three finite numbers above zero"), "{error}");
     std::fs::write(folder.join("objects.json"), "[{}]").unwrap();
-    assert!(recorded.load(&Folders::default()).unwrap_err().to_string().contains("missing field"));
+    assert!(recorded.load(&InputFolders::default()).unwrap_err().to_string().contains("missing field"));
 }
 
 #[test]
 fn frames_written_as_lines_are_read_back() {
-    let mut settings = Simulated::default();
+    let mut settings = SimulatedSource::default();
     settings.trajectory.frames = Count::literal(20);
     settings.detector.depth_error = Some(Positive::literal(0.02));
     let sequence = settings.simulate().unwrap();
-    let lines: Vec<String> = sequence.observations().map(|o| line(&o)).collect();
+    let lines: Vec<String> = sequence.observations().map(|o| format_line(&o)).collect();
     let folder = tempfile::tempdir().unwrap();
-    let folders = Folders { data: None, document: folder.path().into() };
+    let folders = InputFolders { data: None, document: folder.path().into() };
     std::fs::write(folder.path().join("frames.jsonl"), lines.join("\n\n") + "\n").unwrap();
     let camera = serde_json::to_value(sequence.camera).unwrap();
     let source: JsonLines =

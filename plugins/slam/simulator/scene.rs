@@ -128,7 +128,7 @@ impl SceneSettings {
         let turned: Vec<_> = solid.corners().map(|corner| rotation.act(corner)).collect();
         let (lowest, radius) =
             turned.iter().fold((0.0_f64, 0.0_f64), |(z, r), p| (z.min(p.z), r.max(p.xy().norm())));
-        let place = self.place(radius, placed, rng).ok_or(SimulationError::NoRoom { object: id })?;
+        let place = self.free_place(radius, placed, rng).ok_or(SimulationError::NoRoom { object: id })?;
         let translation = place + Vector3::z() * (*self.height - lowest);
         placed.push((place, radius));
         let world_from_object = Se3::new(rotation, translation);
@@ -145,17 +145,17 @@ impl SceneSettings {
     }
 
     /// Returns a free place for an object of this radius, apart from the placed objects.
-    pub(super) fn place(
+    pub(super) fn free_place(
         &self,
         radius: f64,
         placed: &[(Vector3<f64>, f64)],
         rng: &mut Pcg64,
     ) -> Option<Vector3<f64>> {
-        const TRIES: usize = 2000;
+        const MAX_PLACEMENT_TRIES: usize = 2000;
         let [x, y] = self.area.map(|extent| *extent / 2.0);
         let anywhere =
             |rng: &mut Pcg64| Vector3::new(rng.random_range(-x..=x), rng.random_range(-y..=y), 0.0);
         let free = |p: &Vector3<f64>| placed.iter().all(|(q, r)| (p - q).norm() >= radius + r + *self.gap);
-        (0..TRIES).map(|_| anywhere(rng)).find(free)
+        (0..MAX_PLACEMENT_TRIES).map(|_| anywhere(rng)).find(free)
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 use std::f64::consts::TAU;
 
 /// Near plane: closer parts are not visible. Unit: metres.
-const NEAR: f64 = 0.05;
+const NEAR_PLANE_M: f64 = 0.05;
 
 /// Convex faces in space, each a list of corners. The frame's origin is the centre of the enclosing box.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,8 +89,13 @@ impl Solid {
 
     /// Returns the boxes around the solid in an image, without and with the image border. `None` if no part
     /// is in front of the camera or inside the image.
-    pub fn boxes(&self, world_from_object: &Se3, camera: &Camera, world_from_camera: &Se3) -> Option<Boxes> {
-        let (mut whole, mut inside) = (Extent::default(), Extent::default());
+    pub fn boxes(
+        &self,
+        world_from_object: &Se3,
+        camera: &Camera,
+        world_from_camera: &Se3,
+    ) -> Option<ImageBoxes> {
+        let (mut whole, mut inside) = (PixelBounds::default(), PixelBounds::default());
         for front in self.in_front(&world_from_camera.between(world_from_object)) {
             let mut image: Vec<_> = front.iter().map(|p| project(camera, p)).collect();
             image.iter().for_each(|p| whole.add(p));
@@ -102,21 +107,21 @@ impl Solid {
             // an edge that meets the border may be off by rounding
             image.iter().for_each(|p| inside.add(&p.sup(&Vector2::zeros()).inf(&size)));
         }
-        Some(Boxes { whole: whole.bounding_box()?, inside: inside.bounding_box()? })
+        Some(ImageBoxes { whole: whole.bounding_box()?, inside: inside.bounding_box()? })
     }
 
     /// Returns the parts of the faces in front of a camera, in the camera frame.
     pub(super) fn in_front(&self, camera_from_object: &Se3) -> impl Iterator<Item = Vec<Vector3<f64>>> {
         self.faces.iter().map(|face| {
             let seen: Vec<_> = face.iter().map(|corner| camera_from_object.act(corner)).collect();
-            clip(&seen, |p| p.z - NEAR)
+            clip(&seen, |p| p.z - NEAR_PLANE_M)
         })
     }
 }
 
 /// Boxes around an object in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Boxes {
+pub struct ImageBoxes {
     /// Box around the whole object, as if the image had no border.
     pub whole: BoundingBox,
     /// Box around the part inside the image.
@@ -158,9 +163,9 @@ fn clip<const D: usize>(
 
 /// Bounds of the points that were added.
 #[derive(Default)]
-struct Extent(Option<(Vector2<f64>, Vector2<f64>)>);
+struct PixelBounds(Option<(Vector2<f64>, Vector2<f64>)>);
 
-impl Extent {
+impl PixelBounds {
     fn add(&mut self, p: &Vector2<f64>) {
         self.0 = Some(self.0.map_or((*p, *p), |(min, max)| (min.inf(p), max.sup(p))));
     }

@@ -57,15 +57,15 @@ fn rows(path: PathBuf) -> Vec<Vec<f64>> {
 }
 
 /// One pose of the robot, with its measurements.
-struct Step {
+struct RobotStep {
     /// Motion since the previous pose.
     odometry: Option<(Se2, Noise)>,
-    seen: Vec<Seen>,
+    seen: Vec<LandmarkMeasurement>,
 }
 
 /// A measurement of a landmark.
 #[derive(Clone)]
-struct Seen {
+struct LandmarkMeasurement {
     /// Id of the landmark.
     id: usize,
     /// Position relative to the robot. Unit: metres.
@@ -76,7 +76,7 @@ struct Seen {
 }
 
 /// Results of a smoother, pose by pose.
-struct Driven {
+struct SmootherRun {
     session: Smoother,
     /// Newest pose after its update, and the pose from odometry alone.
     newest: Vec<Vector2<f64>>,
@@ -93,11 +93,11 @@ fn cpu_seconds() -> f64 {
 }
 
 /// Maps landmarks by their ids.
-fn drive(steps: &[Step], steering: Option<&Noise>) -> Driven {
+fn drive(steps: &[RobotStep], steering: Option<&Noise>) -> SmootherRun {
     let session = Smoother::new(SmootherSettings::default());
-    let mut driven = Driven { session, newest: vec![], odometry: vec![], times: vec![], gaps: vec![] };
+    let mut driven = SmootherRun { session, newest: vec![], odometry: vec![], times: vec![], gaps: vec![] };
     let (mut pose, mut alone) = (Se2::identity(), Se2::identity());
-    for (i, Step { odometry, seen }) in steps.iter().enumerate() {
+    for (i, RobotStep { odometry, seen }) in steps.iter().enumerate() {
         let session = &mut driven.session;
         let (mut graph, mut values, here) = (Graph::new(), Values::new(), Key::indexed("x", i));
         if let Some((relative, noise)) = odometry {
@@ -131,7 +131,7 @@ fn drive(steps: &[Step], steering: Option<&Noise>) -> Driven {
             if session.estimate(key.as_str()).is_none() && !values.contains(key.as_str()) {
                 values.insert(key.clone(), Point2::new(pose.act(&seen.place)));
             }
-            let Seen { factor, noise, loss, .. } = seen.clone();
+            let LandmarkMeasurement { factor, noise, loss, .. } = seen.clone();
             graph.push(FactorEntry { keys: vec![here.clone(), key], name: None, factor, noise, loss });
         }
         session.push(&graph, &values).unwrap();
@@ -153,7 +153,7 @@ fn drive(steps: &[Step], steering: Option<&Noise>) -> Driven {
     driven
 }
 
-impl Driven {
+impl SmootherRun {
     fn path(&self) -> Vec<Vector2<f64>> {
         let place = |i: usize| self.session.get::<Se2>(Key::indexed("x", i).as_str()).unwrap().translation;
         (0..self.newest.len()).map(place).collect()

@@ -36,7 +36,9 @@ fn each_frame_has_a_velocity_and_the_first_a_prior() {
         factors.filter(|entry| entry.factor.typetag_name() == name).count()
     };
     assert_eq!((of("constant_velocity"), of("prior_twist"), of("between_se3")), (79, 1, 0));
-    run.variants.iter().for_each(|variant| drop(Run::new(&run, None).variant(variant, &mut Silent).unwrap()));
+    run.variants
+        .iter()
+        .for_each(|variant| drop(Run::new(&run, None).run_variant(variant, &mut Silent).unwrap()));
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! Objects that are moved, between two runs or within one.
-use crate::prior_map::{Found, begun, in_map, sequence, settings, told};
+use crate::prior_map::{RelocalizationLog, begun, in_map, sequence, settings, warning_texts};
 use manifactor_slam::estimate::Estimate;
 use manifactor_slam::output::map_of;
 use manifactor_slam::output::write_whole;
 use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::{estimate, online};
 use manifactor_slam::sequence::{ObjectId, Sequence, TrueObject};
-use manifactor_slam::settings::Settings;
+use manifactor_slam::settings::RunSettings;
 use manifactor_solve::Silent;
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 const MOVED: &str = "source.scene.moved=0.25";
 
 /// Returns the numbers of the true objects at these places.
-fn at(places: impl Iterator<Item = Vector3<f64>>, truth: &[TrueObject]) -> BTreeSet<ObjectId> {
+fn objects_at(places: impl Iterator<Item = Vector3<f64>>, truth: &[TrueObject]) -> BTreeSet<ObjectId> {
     let distance =
         |place: &Vector3<f64>, object: &TrueObject| (object.world_from_object.translation - place).norm();
     let nearest = |place: Vector3<f64>| {
@@ -44,9 +44,9 @@ fn what_is_moved_between_two_runs_is_gone_and_added() {
         let ids = |sequence: &Sequence| truth(sequence).iter().map(|o| o.id).collect::<BTreeSet<_>>();
         let (was, is) = (ids(&before), ids(&second));
         let (estimate, report) = estimate("second", second.clone(), &settings, &mut Silent).unwrap();
-        let prior = told(&report);
+        let prior = warning_texts(&report);
         let gone: BTreeSet<_> = prior.gone.iter().copied().collect();
-        let added = at(prior.added.iter().filter_map(|id| place(&estimate, *id)), &truth(&second));
+        let added = objects_at(prior.added.iter().filter_map(|id| place(&estimate, *id)), &truth(&second));
         let (left, new) = (was.difference(&is).copied().collect(), is.difference(&was).copied().collect());
         match association == given {
             true => assert_eq!((gone, added), (left, new)),
@@ -63,7 +63,7 @@ fn place(estimate: &Estimate, id: ObjectId) -> Option<Vector3<f64>> {
 }
 
 /// Two turns around the table; objects are moved after the first.
-fn twice(more: &[&str]) -> Settings {
+fn twice(more: &[&str]) -> RunSettings {
     let twice = ["source.trajectory.sweep=720", "source.trajectory.frames=400", "source.scene.moved_at_s=20"];
     settings(&[&twice[..], more].concat())
 }
@@ -82,13 +82,14 @@ fn what_is_moved_within_a_stream_is_told_and_not_in_its_map() {
         assert_eq!((truth.len(), old.len()), (15, 3));
         let is_right = |(estimate, report): (Estimate, VariantReport)| {
             let gone = report.gone.iter().filter_map(|id| place(&estimate, *id));
-            assert_eq!(at(gone, &truth), old, "{association} {:?}", report.gone);
+            assert_eq!(objects_at(gone, &truth), old, "{association} {:?}", report.gone);
             let map = map_of(&estimate, &settings).unwrap();
-            let left = at(map.objects.iter().map(|object| object.quadric.centroid()), &truth);
+            let left = objects_at(map.objects.iter().map(|object| object.quadric.centroid()), &truth);
             assert!(left.is_disjoint(&old) && left.len() >= 11, "{association} {left:?}");
         };
         is_right(
-            online("stream", all.clone().into(), &settings, &mut Found::default(), &mut Silent).unwrap(),
+            online("stream", all.clone().into(), &settings, &mut RelocalizationLog::default(), &mut Silent)
+                .unwrap(),
         );
         is_right(estimate("batch", all, &settings, &mut Silent).unwrap());
     }

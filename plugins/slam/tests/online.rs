@@ -7,23 +7,23 @@ use manifactor_slam::mapping::Mapping;
 use manifactor_slam::measurement::Quantities;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::report::VariantReport;
-use manifactor_slam::run::{Run, Watch};
-use manifactor_slam::run_document::{RunDocument, Variant};
+use manifactor_slam::run::{Run, StreamWatcher};
+use manifactor_slam::run_document::{RunDocument, RunVariant};
 use manifactor_slam::sequence::{
     Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Sequence,
 };
-use manifactor_slam::settings::{CutSides, Settings};
-use manifactor_slam::source::Folders;
+use manifactor_slam::settings::{CutSides, RunSettings};
+use manifactor_slam::source::InputFolders;
 use manifactor_solve::Silent;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// Collects the reports of all frames.
 #[derive(Default)]
-pub(crate) struct Kept(Vec<FrameReport>);
+pub(crate) struct CollectedReports(Vec<FrameReport>);
 
-impl Watch for Kept {
-    fn frame(
+impl StreamWatcher for CollectedReports {
+    fn on_frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
         _: Option<&Observation>,
@@ -37,13 +37,13 @@ impl Watch for Kept {
 
 /// Checks the map after each frame, and after the last.
 #[derive(Default)]
-struct Looking {
+struct MapChecks {
     frames: usize,
     ends: usize,
 }
 
-impl Watch for Looking {
-    fn frame(
+impl StreamWatcher for MapChecks {
+    fn on_frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
         observation: Option<&Observation>,
@@ -51,8 +51,8 @@ impl Watch for Looking {
         _: f64,
     ) -> ControlFlow<()> {
         let (report, observation) = (report.unwrap(), observation.unwrap());
-        assert_eq!(report.names.len(), observation.detections.len());
-        assert_eq!(mapper.objects().count(), mapper.mapped());
+        assert_eq!(report.box_objects.len(), observation.detections.len());
+        assert_eq!(mapper.objects().count(), mapper.mapped_objects());
         assert_eq!(mapper.pose_of(report.frame), Some(report.pose));
         assert_eq!(mapper.pose_of(report.frame + 1), None);
         // odometry drifts away from the estimate, frame by frame
@@ -62,7 +62,7 @@ impl Watch for Looking {
         ControlFlow::Continue(())
     }
 
-    fn end(&mut self, mapper: &mut Mapper) {
+    fn on_end(&mut self, mapper: &mut Mapper) {
         assert!(mapper.pose_of(0).is_some() && mapper.up().is_some());
         self.ends += 1;
     }
@@ -71,9 +71,9 @@ impl Watch for Looking {
 #[test]
 fn the_map_can_be_looked_at_after_each_frame_and_has_all_poses_with_a_window() {
     let document = run_of(DESK, &["online.window.poses=20"]);
-    let mut looking = Looking::default();
+    let mut looking = MapChecks::default();
     let mut run = Run::new(&document, None);
-    run.variant_online(&document.variants[0], &mut looking, &mut Silent).unwrap();
+    run.run_variant_online(&document.variants[0], &mut looking, &mut Silent).unwrap();
     assert_eq!((looking.frames, looking.ends), (80, 1));
 }
 
@@ -93,34 +93,34 @@ pub(crate) fn run_of(text: &str, sets: &[&str]) -> RunDocument {
 
 pub(crate) fn both(
     run: &RunDocument,
-    variant: &Variant,
+    variant: &RunVariant,
     data: Option<PathBuf>,
-) -> (VariantReport, VariantReport, Kept) {
-    let (mut kept, mut run) = (Kept::default(), Run::new(run, data));
-    let (_, online) = run.variant_online(variant, &mut kept, &mut Silent).unwrap();
+) -> (VariantReport, VariantReport, CollectedReports) {
+    let (mut kept, mut run) = (CollectedReports::default(), Run::new(run, data));
+    let (_, online) = run.run_variant_online(variant, &mut kept, &mut Silent).unwrap();
     // a stream adds a weak prior for the shape of all objects
-    let batch = Variant { settings: variant.settings.clone().for_stream(), ..variant.clone() };
-    let (_, batch) = run.variant(&batch, &mut Silent).unwrap();
+    let batch = RunVariant { settings: variant.settings.clone().for_stream(), ..variant.clone() };
+    let (_, batch) = run.run_variant(&batch, &mut Silent).unwrap();
     (online, batch, kept)
 }
 
 /// Returns the settings of a document without variants, and its sequence.
-fn scene(text: &str) -> (Settings, Sequence) {
+fn scene(text: &str) -> (RunSettings, Sequence) {
     let settings = run_of(text, &[]).variants.remove(0).settings;
-    let sequence = settings.source.load(&Folders::default()).unwrap();
+    let sequence = settings.source.load(&InputFolders::default()).unwrap();
     (settings, sequence)
 }
 
 /// Returns the estimate after these frames as text with all digits.
 fn mapped(mapper: &mut Mapper) -> String {
-    let values = mapper.session().estimates();
+    let values = mapper.smoother().estimates();
     values.iter().map(|(key, value)| format!("{key} {}\n", serde_json::to_string(value).unwrap())).collect()
 }
 
-fn take_all(settings: &Settings, sequence: &Sequence) -> Mapper {
-    let mut mapper = Mapper::new(sequence.opening(), settings);
+fn add_all_frames(settings: &RunSettings, sequence: &Sequence) -> Mapper {
+    let mut mapper = Mapper::new(sequence.header(), settings);
     for observation in sequence.observations() {
-        mapper.take(&observation).unwrap();
+        mapper.add_frame(&observation).unwrap();
     }
     mapper
 }
@@ -133,8 +133,8 @@ fn a_map_that_grew_ends_as_the_batch_does() {
     let (found, expected) = (online.solve.final_cost, batch.solve.final_cost);
     assert!(found <= expected * (1.0 + 1e-3), "{found} {expected}");
     let stream = online.online.unwrap();
-    let born: usize = kept.0.iter().map(|frame| frame.born.len()).sum();
-    assert_eq!((stream.born, stream.objects, stream.refusals), (born, born - stream.withdrawn, 0));
+    let born: usize = kept.0.iter().map(|frame| frame.initialized.len()).sum();
+    assert_eq!((stream.initialized, stream.objects, stream.refusals), (born, born - stream.removed, 0));
     assert!(born >= 4, "objects come before the end: {born} of {}", online.counts.objects);
     // the live estimate differs from the final one, but not by much
     let (live, end) = (stream.trajectory[0].estimate.ate.rmse, online.trajectory[0].estimate.ate.rmse);
@@ -144,22 +144,22 @@ fn a_map_that_grew_ends_as_the_batch_does() {
 #[test]
 fn the_same_frames_give_the_same_bits() {
     let (settings, sequence) = scene(DESK);
-    let (mut one, mut other) = (take_all(&settings, &sequence), take_all(&settings, &sequence));
+    let (mut one, mut other) = (add_all_frames(&settings, &sequence), add_all_frames(&settings, &sequence));
     assert_eq!(mapped(&mut one), mapped(&mut other));
 }
 
 #[test]
 fn a_frame_that_cannot_be_taken_leaves_no_trace() {
     let (settings, sequence) = scene(DESK);
-    let mut expected = take_all(&settings, &sequence);
-    let mut mapper = Mapper::new(sequence.opening(), &settings);
+    let mut expected = add_all_frames(&settings, &sequence);
+    let mut mapper = Mapper::new(sequence.header(), &settings);
     for (i, observation) in sequence.observations().enumerate() {
         let mut bad = observation.clone();
         bad.frame.world_from_camera.translation.x = f64::NAN;
-        assert!(matches!(mapper.take(&bad), Err(FrameError::NotFinite { .. })));
-        mapper.take(&observation).unwrap();
-        let error = mapper.take(&observation).unwrap_err();
-        assert!(matches!(error, FrameError::Time { .. }), "{error}");
+        assert!(matches!(mapper.add_frame(&bad), Err(FrameError::NotFinite { .. })));
+        mapper.add_frame(&observation).unwrap();
+        let error = mapper.add_frame(&observation).unwrap_err();
+        assert!(matches!(error, FrameError::Timestamp { .. }), "{error}");
         if i == 0 {
             assert!(error.to_string().contains("does not come after the one before"), "{error}");
         }
@@ -171,9 +171,9 @@ fn a_frame_that_cannot_be_taken_leaves_no_trace() {
 fn a_rule_without_up_is_refused_at_the_first_frame() {
     let (settings, mut sequence) = scene(DESK);
     sequence.up = None;
-    let mut mapper = Mapper::new(sequence.opening(), &settings);
+    let mut mapper = Mapper::new(sequence.header(), &settings);
     let first: Observation = sequence.observations().next().unwrap();
-    let error = mapper.take(&first).unwrap_err().to_string();
+    let error = mapper.add_frame(&first).unwrap_err().to_string();
     assert!(error.contains("set `[gravity]`"), "{error}");
 }
 
@@ -190,18 +190,18 @@ fn an_object_of_several_things_is_taken_out_again_and_does_not_come_back() {
         let bounds = detection.bounding_box.bounds();
         detection.bounding_box.xmax = bounds[0] + 4.0 * (bounds[2] - bounds[0]);
     }
-    let mut mapper = Mapper::new(sequence.opening(), &settings);
+    let mut mapper = Mapper::new(sequence.header(), &settings);
     let (mut born, mut withdrawn) = (vec![], vec![]);
     for observation in sequence.observations() {
-        let report = mapper.take(&observation).unwrap();
+        let report = mapper.add_frame(&observation).unwrap();
         assert_eq!(report.refused, Vec::<String>::new());
-        born.extend(report.born);
-        withdrawn.extend(report.withdrawn);
+        born.extend(report.initialized);
+        withdrawn.extend(report.removed);
     }
     let key = format!("q{one}");
     assert_eq!(born.iter().filter(|born| born.as_str() == key).count(), 1, "{born:?}");
     assert!(withdrawn.iter().any(|gone| gone.as_str() == key), "{withdrawn:?}");
-    assert!(mapper.session().estimate(&key).is_none());
+    assert!(mapper.smoother().estimate(&key).is_none());
 }
 
 #[test]
@@ -214,10 +214,10 @@ fn an_object_whose_class_changes_gets_the_factors_of_the_other() {
         let (class, score) = if detection.frame < 40 { ("cup", 0.3) } else { ("book", 0.9) };
         detection.scores = ClassScores::single(class, score);
     }
-    let mut mapper = Mapper::new(sequence.opening(), &settings);
-    let revised: usize = sequence.observations().map(|o| mapper.take(&o).unwrap().revised.len()).sum();
+    let mut mapper = Mapper::new(sequence.header(), &settings);
+    let revised: usize = sequence.observations().map(|o| mapper.add_frame(&o).unwrap().revised.len()).sum();
     assert!(revised >= 1);
-    let (graph, _) = mapper.session().graph();
+    let (graph, _) = mapper.smoother().graph();
     let key = format!("q{}", id.unwrap());
     let rules = graph.factors().iter().filter(|f| f.keys.len() == 1 && f.keys[0].as_str() == key);
     let rules: Vec<&str> = rules.map(|f| f.factor.typetag_name()).collect();
@@ -228,15 +228,15 @@ fn an_object_whose_class_changes_gets_the_factors_of_the_other() {
 fn a_window_keeps_objects_and_lets_poses_go() {
     for window in ["{ poses = 12 }", "{ seconds = 1.0 }"] {
         let (settings, sequence) = scene(&format!("{DESK}\n[online]\nwindow = {window}"));
-        let mut mapper = Mapper::new(sequence.opening(), &settings);
+        let mut mapper = Mapper::new(sequence.header(), &settings);
         for observation in sequence.observations() {
-            let report = mapper.take(&observation).unwrap();
+            let report = mapper.add_frame(&observation).unwrap();
             assert_eq!(report.refused, Vec::<String>::new(), "{window}");
         }
-        let keys = mapper.session().estimates();
+        let keys = mapper.smoother().estimates();
         let poses = keys.iter().filter(|(key, _)| key.as_str().starts_with('x')).count();
         assert!((2..40).contains(&poses), "{window}: {poses}");
-        assert_eq!(keys.len() - poses, mapper.mapped());
+        assert_eq!(keys.len() - poses, mapper.mapped_objects());
         // the batch at the end has all frames again
         let estimate = mapper.finish(sequence.clone().into(), &mut Silent).unwrap();
         assert_eq!(estimate.trajectory().len(), 80);
@@ -247,9 +247,9 @@ fn a_window_keeps_objects_and_lets_poses_go() {
 fn boxes_that_cannot_be_taken_are_told_and_the_pose_is_taken() {
     let (mut settings, sequence) = scene(DESK);
     settings.detections.cut_sides = CutSides::Keep;
-    let mut mapper = take_all(&settings, &sequence);
-    let mapped = mapper.mapped();
-    let keys = mapper.session().estimates();
+    let mut mapper = add_all_frames(&settings, &sequence);
+    let mapped = mapper.mapped_objects();
+    let keys = mapper.smoother().estimates();
     let id = keys.iter().find_map(|(key, _)| key.as_str().strip_prefix('q')?.parse().ok()).unwrap();
     let mut frame = sequence.frames.last().unwrap().clone();
     frame.timestamp += 1.0;
@@ -263,32 +263,32 @@ fn boxes_that_cannot_be_taken_are_told_and_the_pose_is_taken() {
     };
     let measured = mapper.measurements().clone();
     let taken = mapper
-        .take(&Observation { frame, detections: vec![far], accelerometer: vec![], unused: vec![] })
+        .add_frame(&Observation { frame, detections: vec![far], accelerometer: vec![], unused: vec![] })
         .unwrap();
     assert!(taken.refused.len() == 1 && taken.refused[0].starts_with("the boxes at"), "{:?}", taken.refused);
-    assert_eq!(taken.names, [None], "they are of no object");
+    assert_eq!(taken.box_objects, [None], "they are of no object");
     assert_eq!(*mapper.measurements(), measured);
-    assert_eq!((taken.frame, mapper.mapped()), (80, mapped));
-    assert!(mapper.session().estimate("x80").is_some());
+    assert_eq!((taken.frame, mapper.mapped_objects()), (80, mapped));
+    assert!(mapper.smoother().estimate("x80").is_some());
 }
 
 #[test]
 fn a_pose_that_cannot_be_taken_is_an_error_and_the_stream_goes_on() {
     let (settings, sequence) = scene(DESK);
-    let mut mapper = take_all(&settings, &sequence);
+    let mut mapper = add_all_frames(&settings, &sequence);
     let last = sequence.observations().last().unwrap();
     let mut frame = last.frame.clone();
     frame.timestamp += 1.0;
     // the jump of the camera is too large to be squared
     frame.world_from_camera = Se3::new(frame.world_from_camera.rotation, nalgebra::Vector3::repeat(1e200));
     let detections: Vec<Detection> = last.detections;
-    let taken = mapper.take(&Observation { frame, detections, accelerometer: vec![], unused: vec![] });
+    let taken = mapper.add_frame(&Observation { frame, detections, accelerometer: vec![], unused: vec![] });
     assert!(matches!(taken, Err(FrameError::Update(_))), "{taken:?}");
     // the stream continues from the frame before
     let mut next = sequence.frames.last().unwrap().clone();
     next.timestamp += 2.0;
     let taken = mapper
-        .take(&Observation { frame: next, detections: vec![], accelerometer: vec![], unused: vec![] })
+        .add_frame(&Observation { frame: next, detections: vec![], accelerometer: vec![], unused: vec![] })
         .unwrap();
     assert_eq!((taken.frame, taken.refused.len()), (80, 0));
 }
@@ -296,7 +296,7 @@ fn a_pose_that_cannot_be_taken_is_an_error_and_the_stream_goes_on() {
 #[test]
 fn a_pose_that_overflows_leaves_nothing_behind_in_the_session() {
     let (settings, sequence) = scene(DESK);
-    let mut mapper = take_all(&settings, &sequence);
+    let mut mapper = add_all_frames(&settings, &sequence);
     let mut frame = sequence.frames.last().unwrap().clone();
     let start = frame.timestamp;
     frame.world_from_camera.translation = nalgebra::Vector3::repeat(f64::MAX);
@@ -306,11 +306,11 @@ fn a_pose_that_overflows_leaves_nothing_behind_in_the_session() {
         accelerometer: vec![],
         unused: vec![],
     };
-    let taken = mapper.take(&observation(&frame, 2.0));
+    let taken = mapper.add_frame(&observation(&frame, 2.0));
     assert!(matches!(taken, Err(FrameError::NotFinite { .. })), "{taken:?}");
-    mapper.session().save().unwrap();
+    mapper.smoother().save().unwrap();
     // its timestamp is ignored
-    mapper.take(&observation(sequence.frames.last().unwrap(), 1.0)).unwrap();
+    mapper.add_frame(&observation(sequence.frames.last().unwrap(), 1.0)).unwrap();
 }
 
 #[test]
@@ -318,21 +318,21 @@ fn a_frame_that_is_refused_does_not_say_which_way_is_up() {
     let text = format!("{DESK}\n[gravity]\ntype = \"accelerometer\"\n");
     let (settings, sequence) = scene(&text);
     let (up, sideways) = (nalgebra::Vector3::new(0.0, -9.8, 0.0), nalgebra::Vector3::new(9.8, 0.0, 0.0));
-    let mut pushed = sequence.opening().into_sequence();
+    let mut pushed = sequence.header().into_sequence();
     for mut observation in sequence.observations() {
         let timestamp = observation.frame.timestamp;
         observation.accelerometer = vec![Acceleration { timestamp, acceleration: up }];
         pushed.push(observation);
     }
-    let mut expected = take_all(&settings, &pushed);
-    let mut mapper = Mapper::new(pushed.opening(), &settings);
+    let mut expected = add_all_frames(&settings, &pushed);
+    let mut mapper = Mapper::new(pushed.header(), &settings);
     for observation in pushed.observations() {
-        mapper.take(&observation).unwrap();
+        mapper.add_frame(&observation).unwrap();
         let mut bad = observation.clone();
         bad.frame.timestamp += 1e-3;
         bad.frame.world_from_camera.translation = nalgebra::Vector3::repeat(1e200);
         bad.accelerometer = vec![Acceleration { timestamp: bad.frame.timestamp, acceleration: sideways }];
-        mapper.take(&bad).unwrap_err();
+        mapper.add_frame(&bad).unwrap_err();
     }
     assert_eq!(mapped(&mut mapper), mapped(&mut expected));
 }
@@ -364,7 +364,7 @@ fn a_desk_of_real_boxes_is_mapped_as_they_come() {
         assert!(found <= expected * 1.01, "{name}: {found} {expected}");
         let stream = online.online.unwrap();
         assert_eq!((stream.refusals, stream.solved_batch), (0, 0), "{name}");
-        assert!(stream.withdrawn > 0, "boxes of several things: {name}");
+        assert!(stream.removed > 0, "boxes of several things: {name}");
         let live = stream.trajectory[0].estimate.ate.rmse;
         assert!(live < 0.025, "{name}: {live}");
     }
@@ -375,7 +375,7 @@ fn root() -> std::path::PathBuf {
 }
 
 /// Returns the settings that `docs/association.md` recommends for streams.
-fn recommended() -> Settings {
+fn recommended() -> RunSettings {
     let page = std::fs::read_to_string(root().join("docs/association.md")).unwrap();
     let mut blocks = page.split("```toml\n").skip(1).filter_map(|block| block.split("```").next());
     let block = blocks.find(|block| block.contains("json_lines")).unwrap();
@@ -386,13 +386,13 @@ fn recommended() -> Settings {
 fn no_object_collapses_or_runs_away_while_a_stream_comes() {
     let settings = recommended();
     let mut without = settings.clone();
-    without.semantics.retain(|rule| rule.factor.name() != "shape_prior");
+    without.semantics.retain(|rule| rule.factor.factor_type() != "shape_prior");
     assert_eq!(without.semantics.len() + 1, settings.semantics.len());
     // a weak one is the default
     [settings, without.for_stream()].iter().for_each(keeps_shapes);
 }
 
-fn keeps_shapes(settings: &Settings) {
+fn keeps_shapes(settings: &RunSettings) {
     let desk = std::fs::read_to_string(root().join("examples/desk/desk.toml")).unwrap();
     let (_, sequence) = scene(&desk);
     let sequence = Sequence {
@@ -400,10 +400,10 @@ fn keeps_shapes(settings: &Settings) {
         detections: sequence.detections.iter().map(|d| Detection { object: None, ..d.clone() }).collect(),
         ..sequence
     };
-    let mut mapper = Mapper::new(sequence.opening(), settings);
+    let mut mapper = Mapper::new(sequence.header(), settings);
     let mut most = 0;
     for observation in sequence.observations() {
-        let report = mapper.take(&observation).unwrap();
+        let report = mapper.add_frame(&observation).unwrap();
         for (measured, quadric) in mapper.objects() {
             let (least, largest) = (quadric.semi_axes.min(), quadric.semi_axes.max());
             assert!(
@@ -414,7 +414,7 @@ fn keeps_shapes(settings: &Settings) {
                 quadric.semi_axes
             );
         }
-        most = most.max(mapper.mapped());
+        most = most.max(mapper.mapped_objects());
     }
     assert!(most >= 15, "{most} objects of 18");
 }

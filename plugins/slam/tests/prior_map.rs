@@ -9,11 +9,11 @@ use manifactor_slam::output::{write_variant, write_whole};
 use manifactor_slam::prior_map::{PriorMap, PriorObject};
 use manifactor_slam::record::VariantRecord;
 use manifactor_slam::report::{PriorMapReport, VariantReport};
-use manifactor_slam::run::{Mapped, Watch, estimate, online};
+use manifactor_slam::run::{MappedSequence, StreamWatcher, estimate, online};
 use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::{ObjectId, Observation, Sequence};
-use manifactor_slam::settings::Settings;
-use manifactor_slam::source::Folders;
+use manifactor_slam::settings::RunSettings;
+use manifactor_slam::source::InputFolders;
 use manifactor_solve::Silent;
 use nalgebra::Vector3;
 use std::ops::{ControlFlow, Range};
@@ -38,19 +38,19 @@ detector = { missed = 0.1, misclassified = 0.05, sigma_px = 3.0 }
 /// A second walk around this table.
 const AGAIN: [&str; 2] = ["source.seed=2", "source.trajectory.seed=2"];
 
-pub(crate) fn settings(sets: &[&str]) -> Settings {
+pub(crate) fn settings(sets: &[&str]) -> RunSettings {
     let mut document = Document::parse("table.toml", TABLE, Format::Toml).unwrap();
     document.set(sets).unwrap();
     RunDocument::read(&document).unwrap().variants.remove(0).settings
 }
 
-pub(crate) fn sequence(settings: &Settings) -> Arc<Sequence> {
-    Arc::new(settings.source.load(&Folders::default()).unwrap())
+pub(crate) fn sequence(settings: &RunSettings) -> Arc<Sequence> {
+    Arc::new(settings.source.load(&InputFolders::default()).unwrap())
 }
 
 /// Returns some of the frames; the odometry begins at the first of them.
-fn part(all: &Sequence, frames: Range<usize>) -> Arc<Sequence> {
-    let (mut part, first) = (all.opening().into_sequence(), all.frames[frames.start].world_from_camera);
+fn part_of_sequence(all: &Sequence, frames: Range<usize>) -> Arc<Sequence> {
+    let (mut part, first) = (all.header().into_sequence(), all.frames[frames.start].world_from_camera);
     part.up = all.up.map(|up| Direction::new(first.rotation.inverse().act(&up)).unwrap());
     for mut observation in all.observations().skip(frames.start).take(frames.len()) {
         observation.frame.world_from_camera = first.between(&observation.frame.world_from_camera);
@@ -70,21 +70,21 @@ fn mapped(folder: &Path, change: impl FnOnce(&mut Sequence)) -> PriorMap {
     map
 }
 
-pub(crate) fn in_map(folder: &Path, more: &[&str]) -> Settings {
+pub(crate) fn in_map(folder: &Path, more: &[&str]) -> RunSettings {
     let file = format!("prior_map.file={}", folder.join("map.json").display());
     settings(&[&AGAIN[..], more, &[&file]].concat())
 }
 
 /// Records the poses, the objects in the first frame, and the time of the relocalization.
 #[derive(Default)]
-pub(crate) struct Found {
+pub(crate) struct RelocalizationLog {
     poses: Vec<Se3>,
     first: Vec<ObjectId>,
     at: Option<usize>,
 }
 
-impl Watch for Found {
-    fn frame(
+impl StreamWatcher for RelocalizationLog {
+    fn on_frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
         _: Option<&Observation>,
@@ -93,7 +93,7 @@ impl Watch for Found {
     ) -> ControlFlow<()> {
         let report = report.unwrap();
         if self.poses.is_empty() {
-            self.first = report.names.iter().copied().flatten().collect();
+            self.first = report.box_objects.iter().copied().flatten().collect();
         }
         self.poses.push(report.pose);
         self.at = self.at.or(report.located.as_ref().map(|_| report.frame));
@@ -108,7 +108,7 @@ fn off(sequence: &Sequence, frame: usize, pose: &Se3) -> [f64; 2] {
     [error.rotation.log().norm().to_degrees(), error.translation.norm()]
 }
 
-pub(crate) fn told(report: &VariantReport) -> &PriorMapReport {
+pub(crate) fn warning_texts(report: &VariantReport) -> &PriorMapReport {
     report.prior_map.as_ref().unwrap()
 }
 
@@ -118,7 +118,7 @@ fn a_map_is_read_as_it_was_written() {
     let map = mapped(folder.path(), |_| {});
     assert!(map.objects.len() >= 11, "{}", map.objects.len());
     assert_eq!(PriorMap::read(&folder.path().join("map.json")).unwrap(), map);
-    let seen = map.objects.iter().filter(|object| object.looks.rate() > 0.5).count();
+    let seen = map.objects.iter().filter(|object| object.looks.detection_rate() > 0.5).count();
     assert!(seen >= 10, "{:?}", map.objects.iter().map(|object| object.looks).collect::<Vec<_>>());
 }
 
@@ -129,15 +129,15 @@ fn a_stream_that_begins_anywhere_finds_its_place() {
     let settings = in_map(folder.path(), &[]);
     let all = sequence(&settings);
     for start in [0, 90] {
-        let stream = part(&all, start..240);
-        let mut watch = Found::default();
+        let stream = part_of_sequence(&all, start..240);
+        let mut watch = RelocalizationLog::default();
         let (estimate, report) = online("again", stream.into(), &settings, &mut watch, &mut Silent).unwrap();
         let at = watch.at.unwrap();
         let [deg, m] = off(&all, start + at, &watch.poses[at]);
         assert!(deg < 5.0 && m < 0.1, "{start}: {deg} {m}");
         let [deg, m] = off(&all, 239, &estimate.trajectory().last().unwrap().pose);
         assert!(deg < 3.0 && m < 0.15, "{start}, in the end: {deg} {m}");
-        let prior = told(&report);
+        let prior = warning_texts(&report);
         assert!(prior.is_located && prior.found.as_ref().unwrap().frame == at);
         assert!(prior.seen.len() >= map.objects.len() - 2 && prior.added.len() <= 2, "{prior:?}");
         assert!(prior.gone.is_empty(), "{prior:?}");
@@ -149,20 +149,27 @@ fn a_batch_finds_the_same_place_as_a_stream() {
     let folder = tempfile::tempdir().unwrap();
     mapped(folder.path(), |_| {});
     let settings = in_map(folder.path(), &[]);
-    let all = part(&sequence(&settings), 40..240);
-    let mapped = Mapped::new(all.clone(), &settings, &mut Silent).unwrap();
+    let all = part_of_sequence(&sequence(&settings), 40..240);
+    let mapped = MappedSequence::new(all.clone(), &settings, &mut Silent).unwrap();
     let (_, report) =
-        online("stream", all.clone().into(), &settings, &mut Found::default(), &mut Silent).unwrap();
-    assert_eq!(mapped.found, told(&report).found);
+        online("stream", all.clone().into(), &settings, &mut RelocalizationLog::default(), &mut Silent)
+            .unwrap();
+    assert_eq!(mapped.found, warning_texts(&report).found);
     // counts of the first map are dropped: every object added since exists at the end, or was merged or
     // removed
-    let known = begun(folder.path(), &told(&report).found.as_ref().unwrap().located.start, &[]);
-    let (_, alone) = online("known", all.clone().into(), &known, &mut Found::default(), &mut Silent).unwrap();
+    let known = begun(folder.path(), &warning_texts(&report).found.as_ref().unwrap().located.start, &[]);
+    let (_, alone) =
+        online("known", all.clone().into(), &known, &mut RelocalizationLog::default(), &mut Silent).unwrap();
     let [found, alone] = [report.online.unwrap(), alone.online.unwrap()];
     assert_eq!(found.seconds.len(), all.frames.len());
-    assert!(found.born.abs_diff(alone.born) <= 2, "{} and {}", found.born, alone.born);
+    assert!(
+        found.initialized.abs_diff(alone.initialized) <= 2,
+        "{} and {}",
+        found.initialized,
+        alone.initialized
+    );
     let (_, report) = estimate("batch", all, &settings, &mut Silent).unwrap();
-    assert!(told(&report).seen.len() >= 10 && told(&report).gone.is_empty());
+    assert!(warning_texts(&report).seen.len() >= 10 && warning_texts(&report).gone.is_empty());
 }
 
 #[test]
@@ -172,9 +179,9 @@ fn a_place_that_is_known_is_not_looked_for() {
     let all = sequence(&in_map(folder.path(), &["association.type=given"]));
     let first = all.frames[0].world_from_camera;
     let settings = begun(folder.path(), &first, &["association.type=likelihood"]);
-    let mut watch = Found::default();
+    let mut watch = RelocalizationLog::default();
     let (_, report) = online("again", all.clone().into(), &settings, &mut watch, &mut Silent).unwrap();
-    let prior = told(&report);
+    let prior = warning_texts(&report);
     assert!(watch.at.is_none() && prior.found.is_none() && prior.is_located);
     let error = first.between(&watch.poses[0]);
     assert!(error.log().norm() < 1e-3, "{error:?}");
@@ -189,10 +196,15 @@ fn another_table_is_not_taken_for_this_one() {
     mapped(folder.path(), |_| {});
     for seed in [7, 8, 9] {
         let settings = in_map(folder.path(), &[&format!("source.scene.seed={seed}")]);
-        let (estimate, report) =
-            online("other", sequence(&settings).into(), &settings, &mut Found::default(), &mut Silent)
-                .unwrap();
-        let prior = told(&report);
+        let (estimate, report) = online(
+            "other",
+            sequence(&settings).into(),
+            &settings,
+            &mut RelocalizationLog::default(),
+            &mut Silent,
+        )
+        .unwrap();
+        let prior = warning_texts(&report);
         assert!(!prior.is_located && prior.seen.is_empty() && prior.added.is_empty());
         assert!(report.warnings.iter().any(|warning| warning.to_string().contains("not clear where in")));
         // the run has made a new map
@@ -210,9 +222,9 @@ fn a_room_with_a_few_things_that_stand_as_in_the_map_is_not_taken_for_it() {
     let mut few = Sequence::clone(&all);
     few.detections.retain(|detection| detection.object.is_some_and(|id| id.0 <= 5));
     for (stream, is_located) in [(all, true), (Arc::new(few), false)] {
-        let mut watch = Found::default();
+        let mut watch = RelocalizationLog::default();
         let (_, report) = online("stream", stream.into(), &settings, &mut watch, &mut Silent).unwrap();
-        assert_eq!(told(&report).is_located, is_located, "{:?} of {}", watch.at, map.objects.len());
+        assert_eq!(warning_texts(&report).is_located, is_located, "{:?} of {}", watch.at, map.objects.len());
     }
 }
 
@@ -233,8 +245,9 @@ fn what_is_gone_is_told_and_what_is_new_is_added() {
     };
     second.detections.retain(known(gone));
     let (estimate, report) =
-        online("second", Arc::new(second).into(), &settings, &mut Found::default(), &mut Silent).unwrap();
-    let prior = told(&report);
+        online("second", Arc::new(second).into(), &settings, &mut RelocalizationLog::default(), &mut Silent)
+            .unwrap();
+    let prior = warning_texts(&report);
     let near = |id: &ObjectId, map: &PriorMap, place: Vector3<f64>| {
         map.object(*id).is_some_and(|object| (object.quadric.centroid() - place).norm() < 0.1)
     };
@@ -253,7 +266,7 @@ fn what_is_gone_is_told_and_what_is_new_is_added() {
 }
 
 /// Returns settings with a known start in the map: simulated walks begin at the first pose of their odometry.
-pub(crate) fn begun(folder: &Path, first: &Se3, more: &[&str]) -> Settings {
+pub(crate) fn begun(folder: &Path, first: &Se3, more: &[&str]) -> RunSettings {
     let rotation = format!("prior_map.start.rotation={:?}", first.rotation.quaternion_xyzw());
     let translation = format!("prior_map.start.translation={:?}", first.translation.as_slice());
     in_map(folder, &[more, &[&rotation, &translation]].concat())
@@ -271,7 +284,11 @@ fn what_is_not_seen_again_does_not_fade() {
         few.detections.clear();
         let settings = begun(folder.path(), &all.frames[0].world_from_camera, &[]);
         let (estimate, report) = estimate("again", Arc::new(few), &settings, &mut Silent).unwrap();
-        assert!(told(&report).seen.is_empty() && told(&report).gone.is_empty(), "{:?}", told(&report));
+        assert!(
+            warning_texts(&report).seen.is_empty() && warning_texts(&report).gone.is_empty(),
+            "{:?}",
+            warning_texts(&report)
+        );
         let after = map_of(&estimate, &settings).unwrap();
         let known = |map: &PriorMap| -> Vec<_> {
             map.objects.iter().map(|o| (o.id, o.classes.clone(), o.quadric, o.covariance)).collect()
@@ -308,24 +325,24 @@ fn a_frame_that_is_left_out_counts_once_and_in_no_number() {
     let folder = tempfile::tempdir().unwrap();
     mapped(folder.path(), |_| {});
     let settings = in_map(folder.path(), &[]);
-    let mut all = Sequence::clone(&part(&sequence(&settings), 40..240));
+    let mut all = Sequence::clone(&part_of_sequence(&sequence(&settings), 40..240));
     all.frames[2].world_from_camera.translation.x = f64::NAN;
     let all = Arc::new(all);
-    let mut watch = Left(0, None);
+    let mut watch = SkippedFrames(0, None);
     let (_, report) = online("stream", all.clone().into(), &settings, &mut watch, &mut Silent).unwrap();
     let online = report.online.as_ref().unwrap();
     assert_eq!((online.refusals, online.refused.len(), watch.0), (1, 1, 1));
-    let mapped = Mapped::new(all, &settings, &mut Silent);
+    let mapped = MappedSequence::new(all, &settings, &mut Silent);
     // a batch does not accept non-finite frames, so only the frame of the relocalization is compared
     let found = mapped.map(|mapped| mapped.found.unwrap().frame);
     assert_eq!(found.ok().or(watch.1), watch.1);
 }
 
 /// Counts skipped frames, and records the time of the relocalization.
-struct Left(usize, Option<usize>);
+struct SkippedFrames(usize, Option<usize>);
 
-impl Watch for Left {
-    fn frame(
+impl StreamWatcher for SkippedFrames {
+    fn on_frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
         _: Option<&Observation>,
@@ -344,7 +361,7 @@ fn classes_of_a_map_are_called_as_the_run_calls_them() {
     let map = mapped(folder.path(), |_| {});
     let plain = in_map(folder.path(), &[]);
     let other = in_map(folder.path(), &["aliases={ bottle = \"flask\" }"]);
-    let count = |settings: &Settings, class: &str| {
+    let count = |settings: &RunSettings, class: &str| {
         let map = &settings.prior_map.as_ref().unwrap().map;
         map.objects
             .iter()
@@ -405,6 +422,6 @@ fn what_is_too_far_away_to_be_seen_is_not_looked_at() {
         let mut blind = Sequence::clone(&sequence(&settings));
         blind.detections.clear();
         let (_, report) = estimate("blind", Arc::new(blind), &settings, &mut Silent).unwrap();
-        assert_eq!(told(&report).gone.is_empty(), !is_gone, "{:?}", told(&report));
+        assert_eq!(warning_texts(&report).gone.is_empty(), !is_gone, "{:?}", warning_texts(&report));
     }
 }

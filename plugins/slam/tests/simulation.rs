@@ -4,7 +4,7 @@ use manifactor_slam::experiment::{Experiment, Trial};
 use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::Sequence;
-use manifactor_slam::source::Folders;
+use manifactor_slam::source::InputFolders;
 use manifactor_solve::Silent;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -43,9 +43,9 @@ fn the_scenes_are_those_that_were_settled() {
     let mut scenes = BTreeMap::new();
     for trial in &experiment.trials {
         let label = scene(&experiment, trial);
-        scenes
-            .entry(label.parse::<u32>().unwrap())
-            .or_insert_with(|| objects(label, &trial.settings.source.load(&Folders::default()).unwrap()));
+        scenes.entry(label.parse::<u32>().unwrap()).or_insert_with(|| {
+            objects(label, &trial.settings.source.load(&InputFolders::default()).unwrap())
+        });
     }
     assert_eq!(scenes.len(), 10);
     let header = "scene,object,class,x_mm,y_mm,z_mm,width_mm,depth_mm,height_mm\n".to_owned();
@@ -86,7 +86,7 @@ fn errors_are_as_large_as_covariances_say_where_the_noise_is_known() {
         );
         let document = Document::parse("run.toml", text, Format::Toml).unwrap();
         let run = RunDocument::read(&document).unwrap();
-        let (_, report) = Run::new(&run, None).variant(&run.variants[0], &mut Silent).unwrap();
+        let (_, report) = Run::new(&run, None).run_variant(&run.variants[0], &mut Silent).unwrap();
         report.consistency.unwrap()
     };
     let all: Vec<_> = (1..=8).map(consistency).collect();

@@ -29,7 +29,7 @@ pub(crate) fn document(config: &str, sets: &[&str]) -> RunDocument {
 
 fn run(data: &Path, document: &RunDocument, variant: &str) -> (Estimate, VariantReport) {
     let variant = document.variants.iter().find(|v| v.name == variant).unwrap();
-    Run::new(document, Some(data.to_owned())).variant(variant, &mut Silent).unwrap()
+    Run::new(document, Some(data.to_owned())).run_variant(variant, &mut Silent).unwrap()
 }
 
 /// Returns the numbers of objects and boxes of a config's variant `Q`.
@@ -221,7 +221,7 @@ fn corrected(data: &Path, odometry: &str, sigma: f64) -> (f64, MotionChoice) {
 fn an_odometry_that_drifts_is_corrected_and_a_good_one_is_left() {
     let Some(data) = data() else { return };
     let (gain, choice) = corrected(&data, "dvo_vo", 1e-4);
-    assert!(gain > 0.2 && !choice.is_kept(), "{gain}: {choice:?}");
+    assert!(gain > 0.2 && !choice.keeps_input(), "{gain}: {choice:?}");
     assert_eq!(corrected(&data, "dvo_vo", 0.1), (gain, choice));
     let (gain, choice) = corrected(&data, "orbslam2_rgbd_a_duanyongli", 0.1);
     assert!(gain > -0.02, "{gain}: {choice:?}");

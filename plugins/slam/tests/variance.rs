@@ -3,13 +3,13 @@ use manifactor_config::{Document, Format};
 use manifactor_graph::loss::Loss;
 use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
-use manifactor_slam::variance::Components;
+use manifactor_slam::variance::VarianceComponents;
 use manifactor_solve::Silent;
 use std::sync::Arc;
 
 /// Returns the noise that is estimated in a simulated recording, with `sigma` and `sigma_px` as initial
 /// values.
-fn found(odometry: f64, sigma: f64, sigma_px: f64) -> Components {
+fn found(odometry: f64, sigma: f64, sigma_px: f64) -> VarianceComponents {
     let text = format!(
         "
         source = {{ type = 'simulated', seed = 3, scene = {{ objects = 8, classes = ['sports ball'] }},
@@ -22,7 +22,7 @@ fn found(odometry: f64, sigma: f64, sigma_px: f64) -> Components {
     );
     let document = Document::parse("run.toml", text, Format::Toml).unwrap();
     let run = RunDocument::read(&document).unwrap();
-    let (estimate, report) = Run::new(&run, None).variant(&run.variants[0], &mut Silent).unwrap();
+    let (estimate, report) = Run::new(&run, None).run_variant(&run.variants[0], &mut Silent).unwrap();
     assert_eq!(report.variance_components, estimate.components);
     estimate.components.last().unwrap().clone()
 }
@@ -37,7 +37,7 @@ fn the_noise_of_the_simulation_is_found_whatever_the_document_says_of_it() {
     // 10 % of 5 degrees, per axis; the grid has half decades
     let expected = 0.1 * (300f64 / 59.0).to_radians() / 3f64.sqrt();
     let choice = found.odometry.unwrap();
-    assert!(!choice.is_kept(), "{choice:?}");
+    assert!(!choice.keeps_input(), "{choice:?}");
     let turn = choice.noise.rotation;
     assert!((turn / expected).log10().abs() < 0.5, "{turn}, not {expected}");
 }
@@ -66,7 +66,7 @@ fn losses(loss: &str) -> (Vec<Arc<dyn Loss>>, f64) {
     );
     let document = Document::parse("run.toml", text, Format::Toml).unwrap();
     let run = RunDocument::read(&document).unwrap();
-    let (estimate, _) = Run::new(&run, None).variant(&run.variants[0], &mut Silent).unwrap();
+    let (estimate, _) = Run::new(&run, None).run_variant(&run.variants[0], &mut Silent).unwrap();
     let found = estimate.components.last().unwrap().boxes["all"];
     let boxes = estimate.mapping.graph.factors().iter().filter_map(|factor| factor.loss.clone());
     (boxes.collect(), found.correlation_time)
@@ -100,7 +100,7 @@ fn the_noise_of_boxes_is_not_that_of_their_depths() {
         variance_components = { rounds = 1 }";
     let document = Document::parse("run.toml", text, Format::Toml).unwrap();
     let run = RunDocument::read(&document).unwrap();
-    let (estimate, _) = Run::new(&run, None).variant(&run.variants[0], &mut Silent).unwrap();
+    let (estimate, _) = Run::new(&run, None).run_variant(&run.variants[0], &mut Silent).unwrap();
     let factors = estimate.mapping.graph.factors().iter();
     let depths = factors.filter(|entry| entry.factor.typetag_name() == "centroid_depth");
     let information = depths.map(|entry| entry.noise.information_matrix(1).unwrap()[(0, 0)]);

@@ -7,7 +7,7 @@ use super::picture::Picture;
 use super::scale::Scale;
 use super::scene::Palette;
 use crate::canvas::{Ink, Sheet, Stroke};
-use manifactor_slam::record::{FrameRecord, SeenBox, VariantRecord};
+use manifactor_slam::record::{BoxRecord, FrameRecord, VariantRecord};
 use nalgebra::{Matrix2, Point2};
 
 /// Largest ratio of height to width. A taller image is drawn flatter, because a PNG needs memory for each
@@ -29,7 +29,7 @@ pub(crate) fn image(
     width: f64,
 ) -> Picture {
     let size = [variant.camera.width, variant.camera.height].map(f64::from);
-    let class = |seen: &SeenBox| {
+    let class = |seen: &BoxRecord| {
         let object = variant.objects.iter().find(|object| object.id == seen.object);
         object.map_or("unknown", |object| object.class.as_str())
     };

@@ -3,7 +3,7 @@ use super::outline::Shape;
 use crate::canvas::{Ink, Stroke};
 use manifactor_graph::Direction;
 use manifactor_quadric::DualQuadric;
-use manifactor_slam::record::{FrameRecord, ObjectRecord, RunRecord, Solid, VariantRecord};
+use manifactor_slam::record::{FrameRecord, ObjectRecord, RunRecord, TrueCuboid, VariantRecord};
 use nalgebra::{Matrix3, Vector3};
 
 /// Trajectories and objects in one frame. Unit: metres.
@@ -114,7 +114,7 @@ fn ellipsoid(quadric: &DualQuadric) -> Shape {
 }
 
 /// Returns the ellipsoid that fills the cuboid of a solid.
-fn solid(truth: &Solid) -> Shape {
+fn solid(truth: &TrueCuboid) -> Shape {
     let axes = truth.pose.rotation.matrix() * Matrix3::from_diagonal(&Vector3::from(truth.half_extents));
     Shape { centroid: truth.pose.translation, axes }
 }

@@ -4,13 +4,13 @@ use crate::drawing::{Chart, Curve, Distribution, Picture, figure};
 use crate::pages::page::Page;
 use crate::pages::run_page::{WIDTH, version};
 use manifactor_formats::table::{Column, Table};
-use manifactor_slam::experiment::{Experiment, Summary};
+use manifactor_slam::experiment::{Experiment, ExperimentSummary};
 
 /// Draws one picture for each metric of an experiment: curves over the column that the summary names, or
 /// distributions. Unit of `width`: pixels.
 pub fn experiment_pictures(
     experiment: &Experiment,
-    summary: &Summary,
+    summary: &ExperimentSummary,
     trials: &Table,
     width: f64,
 ) -> Vec<Picture> {
@@ -35,7 +35,12 @@ pub fn experiment_pictures(
 const TRIALS: usize = 1000;
 
 /// Returns the page of an experiment. `trials` is the table of trials, `config` the text of the document.
-pub fn experiment_page(experiment: &Experiment, summary: &Summary, trials: &Table, config: &str) -> String {
+pub fn experiment_page(
+    experiment: &Experiment,
+    summary: &ExperimentSummary,
+    trials: &Table,
+    config: &str,
+) -> String {
     let mut page = Page::new(&experiment.title);
     let done = experiment.trials.len() - summary.open;
     page.paragraph(&format!("{done} of {} trials. {}", experiment.trials.len(), version()));
@@ -79,7 +84,7 @@ fn short(x: f64) -> String {
 }
 
 /// Returns the values of a metric by group of the summary.
-fn distribution(summary: &Summary, trials: &Table, metric: &str) -> Distribution {
+fn distribution(summary: &ExperimentSummary, trials: &Table, metric: &str) -> Distribution {
     let column = |name: &str| trials.columns.iter().find(|(own, _)| own == name).map(|(_, column)| column);
     let texts = |name: &String| match column(name) {
         Some(Column::Text(cells)) => cells.as_slice(),
@@ -90,7 +95,7 @@ fn distribution(summary: &Summary, trials: &Table, metric: &str) -> Distribution
         _ => &[],
     };
     let labels: Vec<&[String]> = summary.columns.iter().map(texts).collect();
-    let group = |group: &manifactor_slam::experiment::Group| {
+    let group = |group: &manifactor_slam::experiment::TrialGroup| {
         let belongs =
             |row: usize| labels.iter().zip(&group.labels).all(|(cells, label)| cells.get(row) == Some(label));
         let own = values.iter().enumerate().filter(|(row, _)| belongs(*row)).filter_map(|(_, value)| *value);
@@ -105,7 +110,7 @@ fn distribution(summary: &Summary, trials: &Table, metric: &str) -> Distribution
 
 /// Returns the means of a metric over a numeric column: one curve for each combination of the remaining
 /// columns.
-fn curves(summary: &Summary, x: &str, metric: &str) -> Vec<Curve> {
+fn curves(summary: &ExperimentSummary, x: &str, metric: &str) -> Vec<Curve> {
     let place = summary.columns.iter().position(|column| column == x);
     let mut curves: Vec<Curve> = vec![];
     for group in &summary.groups {

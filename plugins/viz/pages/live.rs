@@ -9,11 +9,11 @@ use crate::canvas::Ink;
 use manifactor_formats::replay::Latencies;
 use manifactor_graph::Direction;
 use manifactor_quadric::{BoundingBox, Camera, DualQuadric};
-use manifactor_slam::estimate::{Estimate, Landmark};
+use manifactor_slam::estimate::{Estimate, LandmarkEstimate};
 use manifactor_slam::mapping::object_key;
-use manifactor_slam::measurements::Measured;
+use manifactor_slam::measurements::ObjectMeasurements;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
-use manifactor_slam::record::{FrameRecord, ObjectRecord, SeenBox, TrackedPose};
+use manifactor_slam::record::{BoxRecord, FrameRecord, ObjectRecord, PoseRecord};
 use manifactor_slam::sequence::{ObjectId, Observation};
 use nalgebra::Vector3;
 use notes::Notes;
@@ -75,7 +75,7 @@ pub enum Phase {
 #[derive(Debug, Clone)]
 enum LiveBox {
     /// The box of an object.
-    Named(SeenBox, String),
+    Named(BoxRecord, String),
     /// A box without an object, or of an object that is not in the map yet.
     Nameless(BoundingBox, String),
 }
@@ -111,7 +111,7 @@ impl LiveMap {
             self.path.begin_odometry_at(&located.start);
             self.path.correct(|frame| mapper.pose_of(frame));
         }
-        self.notes.take(report, |id| mapper.names().now(id));
+        self.notes.take(report, |id| mapper.id_changes().current_id(id));
         let parked = report
             .updates
             .last()
@@ -125,7 +125,7 @@ impl LiveMap {
         self.look(mapper);
         if let Some(observation) = observation {
             let odometry = mapper.odometry(observation).unwrap_or(report.pose);
-            let tracked = |pose| TrackedPose { pose, error: None, relative: None };
+            let tracked = |pose| PoseRecord { pose, error: None, relative: None };
             self.path.push(FrameRecord {
                 timestamp: report.timestamp,
                 truth: None,
@@ -140,7 +140,7 @@ impl LiveMap {
     /// Updates the whole path and the cost. The time is linear in the size of the map.
     pub fn refresh(&mut self, mapper: &mut Mapper) {
         self.path.correct(|frame| mapper.pose_of(frame));
-        self.cost = Some(mapper.session().cost());
+        self.cost = Some(mapper.smoother().cost());
         self.look(mapper);
     }
 
@@ -149,7 +149,7 @@ impl LiveMap {
         let poses = estimate.trajectory();
         self.path.correct(|frame| poses.get(frame).map(|stamped| stamped.pose));
         let landmarks = estimate.landmarks();
-        let record = |mark: &Landmark<'_>| {
+        let record = |mark: &LandmarkEstimate<'_>| {
             let class = mark.object.class.as_ref().map(|class| class.name.as_str());
             record(mark.object.id, class, mark.object.boxes, *mark.quadric)
         };
@@ -168,7 +168,7 @@ impl LiveMap {
     /// Updates the objects and the up direction.
     fn look(&mut self, mapper: &Mapper) {
         self.camera = Some(*mapper.camera());
-        let record = |(measured, quadric): (&Measured, DualQuadric)| {
+        let record = |(measured, quadric): (&ObjectMeasurements, DualQuadric)| {
             record(measured.id, measured.class_name(), measured.views.len(), quadric)
         };
         self.hold(mapper.objects().map(record).collect());
@@ -190,15 +190,15 @@ impl LiveMap {
     /// Stores the boxes of a frame, each with the prediction of the estimate.
     fn see(&mut self, report: &FrameReport, observation: &Observation, mapper: &Mapper) {
         let known = |id: ObjectId| self.objects.iter().find(|object| object.id == id);
-        let boxes = observation.detections.iter().zip(&report.names).map(|(detection, name)| {
+        let boxes = observation.detections.iter().zip(&report.box_objects).map(|(detection, name)| {
             let class = detection.scores.best().map_or("unknown", |(class, _)| class);
-            let Some(id) = name.map(|name| mapper.names().now(name)) else {
+            let Some(id) = name.map(|name| mapper.id_changes().current_id(name)) else {
                 return LiveBox::Nameless(detection.bounding_box, short(class));
             };
             let object = known(id);
             let class = object.map_or(class, |object| object.class.as_str());
             let estimate = object.and_then(|object| Some((&report.pose, object.estimate.as_ref()?)));
-            let seen = SeenBox::new(id, detection.bounding_box, estimate, mapper.camera());
+            let seen = BoxRecord::new(id, detection.bounding_box, estimate, mapper.camera());
             LiveBox::Named(seen, format!("{} {id}", short(class)))
         });
         self.boxes = boxes.collect();

@@ -3,8 +3,10 @@ use super::page::Page;
 use manifactor_graph::Key;
 use manifactor_slam::mapping::MappedObject;
 use manifactor_slam::record::VariantRecord;
-use manifactor_slam::report::{Mean, ObjectReport, Prediction, Row, RunReport, VariantReport};
-use manifactor_slam::variance::{MotionComponent, Score};
+use manifactor_slam::report::{
+    ClusteredMean, ObjectReport, Prediction, RunReport, VariantReport, VariantRow,
+};
+use manifactor_slam::variance::{CrossValidationScore, MotionComponent};
 
 pub(super) fn words<const N: usize>(words: [&str; N]) -> Vec<String> {
     words.map(str::to_owned).into()
@@ -27,7 +29,7 @@ pub(super) fn overview(report: &RunReport) -> (Vec<String>, Vec<Vec<String>>) {
         "converged",
     ];
     let number = |x: Option<f64>| x.map_or_else(|| "-".into(), |x| format!("{x:.5}"));
-    let row = |row: Row| {
+    let row = |row: VariantRow| {
         vec![
             row.variant,
             number(row.odometry_ate),
@@ -60,8 +62,8 @@ pub(super) fn noise(page: &mut Page, report: &VariantReport) {
         rows.push(alone("odometry, rotation (rad)", rotation));
         rows.push(alone("odometry, translation (m)", translation));
         rows.push(alone("odometry, pivot (m)", pivot));
-        let Score { cost, deviation } = choice.score;
-        let kept = if choice.is_kept() { ": kept as it came in" } else { "" };
+        let CrossValidationScore { cost, deviation } = choice.score;
+        let kept = if choice.keeps_input() { ": kept as it came in" } else { "" };
         rows.push(alone(&format!("cost of boxes of other objects{kept}"), cost));
         rows.push(alone("its standard error", deviation));
     }
@@ -84,7 +86,7 @@ pub(super) fn held_out(page: &mut Page, report: &VariantReport) {
         "Predicted by an estimate that did without them; {unmapped} more are of objects that are not in the map. Errors are standard \
          errors over objects."
     ));
-    let number = |mean: Mean, digits: usize| {
+    let number = |mean: ClusteredMean, digits: usize| {
         let error = mean.error.map(|error| format!(" ± {error:.digits$}")).unwrap_or_default();
         format!("{:.digits$}{error}", mean.mean)
     };

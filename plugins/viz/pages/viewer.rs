@@ -5,7 +5,7 @@ use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
 use manifactor_quadric::{BoundingBox, Camera, DualQuadric};
 use manifactor_slam::record::{
-    FrameRecord, ObjectRecord, RunRecord, SeenBox, Solid, TrackedPose, VariantRecord,
+    BoxRecord, FrameRecord, ObjectRecord, PoseRecord, RunRecord, TrueCuboid, VariantRecord,
 };
 use serde_json::{Value, json};
 
@@ -75,7 +75,7 @@ pub(super) fn scene(
 /// `[seconds, true position, position by odometry, its error, estimated pose, its error, boxes]`
 pub(super) fn of_frame(frame: &FrameRecord, start: f64) -> Value {
     let position = |pose: &Se3| numbers(pose.translation.iter(), 4);
-    let error = |tracked: &TrackedPose| tracked.error.map(|x| number(x, 5));
+    let error = |tracked: &PoseRecord| tracked.error.map(|x| number(x, 5));
     json!([
         number(frame.timestamp - start, 3),
         frame.truth.as_ref().map(position),
@@ -88,7 +88,7 @@ pub(super) fn of_frame(frame: &FrameRecord, start: f64) -> Value {
 }
 
 /// `[object, measured, outline of the estimate]`
-pub(super) fn of_box(seen: &SeenBox) -> Value {
+pub(super) fn of_box(seen: &BoxRecord) -> Value {
     json!([seen.object, bounds(&seen.measured), seen.ellipse.map(ellipse)])
 }
 
@@ -99,7 +99,7 @@ pub(super) fn bounds(of_box: &BoundingBox) -> Vec<Value> {
 
 pub(super) fn of_object(object: &ObjectRecord, color: Ink) -> Value {
     let quadric = |q: &DualQuadric| [pose(&q.pose), numbers(q.semi_axes.iter(), 5)].concat();
-    let solid = |s: &Solid| [pose(&s.pose), numbers(s.half_extents.iter(), 5)].concat();
+    let solid = |s: &TrueCuboid| [pose(&s.pose), numbers(s.half_extents.iter(), 5)].concat();
     let factors = object.factors.iter().map(|factor| {
         let residual = numbers(factor.residual.iter(), 3);
         json!({ "factor": factor.factor, "because": factor.because, "with": factor.with, "residual": residual })

@@ -3,14 +3,14 @@ use super::{TIME, clock};
 use crate::canvas::Ink;
 use crate::drawing::{Chart, Curve, Picture, figure};
 use manifactor_formats::words::count;
-use manifactor_slam::record::{FrameRecord, TrackedPose, VariantRecord};
+use manifactor_slam::record::{FrameRecord, PoseRecord, VariantRecord};
 
-type Part = fn(&FrameRecord) -> &TrackedPose;
+type Part = fn(&FrameRecord) -> &PoseRecord;
 /// Odometry, then the estimate.
 const BOTH: [(&str, Ink, Part); 2] =
     [("odometry", Ink::Odometry, |f| &f.odometry), ("estimated", Ink::Estimate, |f| &f.estimate)];
 
-fn curves(variant: &VariantRecord, error: impl Fn(&TrackedPose) -> Option<f64>) -> Vec<Curve> {
+fn curves(variant: &VariantRecord, error: impl Fn(&PoseRecord) -> Option<f64>) -> Vec<Curve> {
     let clock = clock(variant);
     let curve = |(name, ink, of): &(&str, Ink, Part)| {
         let error = |f| error(of(f)).unwrap_or(f64::NAN);

@@ -7,18 +7,20 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 use manifactor_geometry::Se3;
 use manifactor_quadric::DualQuadric;
-use manifactor_slam::association::{Association, Image, Likelihood, Map, Names};
-use manifactor_slam::class::Aliases;
+use manifactor_slam::association::{
+    Association, FrameDetections, LikelihoodAssociation, MapEstimate, ObjectIdChanges,
+};
+use manifactor_slam::class::ClassAliases;
 use manifactor_slam::metrics::{IdentityScores, identity};
 use manifactor_slam::sequence::{ObjectId, Sequence};
-use manifactor_slam::simulator::Simulated;
-use manifactor_slam::source::{Folders, Source, TumRgbd};
+use manifactor_slam::simulator::SimulatedSource;
+use manifactor_slam::source::{InputFolders, SequenceSource, TumRgbd};
 use serde_json::{Value, from_str, from_value, json};
 
 /// A map that has only the poses of the odometry.
 struct Odometry<'a>(&'a Sequence);
 
-impl Map for Odometry<'_> {
+impl MapEstimate for Odometry<'_> {
     fn pose(&self, frame: usize) -> Option<Se3> {
         Some(self.0.frames.get(frame)?.world_from_camera)
     }
@@ -29,7 +31,7 @@ impl Map for Odometry<'_> {
 
 fn load(name: &str) -> Sequence {
     let data = std::env::var("MANIFACTOR_DATA").ok().map(Into::into);
-    let folders = Folders { data, ..Folders::default() };
+    let folders = InputFolders { data, ..InputFolders::default() };
     if let Some((sequence, odometry)) = name.split_once(':') {
         let (sequence, odometry) =
             (format!("rgbd_dataset_freiburg{sequence}"), format!("trajectories/{odometry}"));
@@ -48,31 +50,34 @@ fn load(name: &str) -> Sequence {
         "trajectory": { "frames": 300, "seed": seed },
         "detector": { "missed": 0.1, "occluded": 0.15, "sigma_px": 4.0, "misclassified": 0.05, "confused": 0.1 },
     });
-    from_value::<Simulated>(source).unwrap().load(&folders).unwrap()
+    from_value::<SimulatedSource>(source).unwrap().load(&folders).unwrap()
 }
 
 /// Scores of the associations at arrival, at the end, and after a final reconsideration.
-fn scores(settings: &Likelihood, sequence: &Sequence) -> [IdentityScores; 3] {
+fn scores(settings: &LikelihoodAssociation, sequence: &Sequence) -> [IdentityScores; 3] {
     let map = Odometry(sequence);
-    let mut associator = settings.begin(sequence.camera, &Aliases::default(), &[]);
-    let (mut names, mut then) = (Names::default(), vec![]);
+    let mut associator = settings.create_associator(sequence.camera, &ClassAliases::default(), &[]);
+    let (mut names, mut then) = (ObjectIdChanges::default(), vec![]);
     let frames: Vec<_> = sequence.observations().collect();
     let image = |frame: usize| {
         let (timestamp, detections) = (frames[frame].frame.timestamp, frames[frame].detections.as_slice());
-        Image { frame, timestamp, detections }
+        FrameDetections { frame, timestamp, detections }
     };
     for frame in 0..frames.len() {
         let put = associator.associate(&image(frame), &map);
-        let learned = associator.learn(&image(frame), &put, &map);
-        learned.moved.iter().for_each(|moved| names.put(moved));
-        learned.merged.into_iter().for_each(|merge| names.merge(merge));
+        let learned = associator.learn_from_frame(&image(frame), &put, &map);
+        learned.moved.iter().for_each(|moved| names.record_move(moved));
+        learned.merged.into_iter().for_each(|merge| names.record_merge(merge));
         then.push(put);
     }
     let now_of = |frame: usize, put: &Vec<Option<ObjectId>>| -> Vec<Option<ObjectId>> {
-        put.iter().enumerate().map(|(place, id)| id.map(|id| names.of(id, frame, place))).collect()
+        put.iter()
+            .enumerate()
+            .map(|(place, id)| id.map(|id| names.object_of_detection(id, frame, place)))
+            .collect()
     };
     let now: Vec<Vec<_>> = then.iter().enumerate().map(|(frame, put)| now_of(frame, put)).collect();
-    let again = now.iter().enumerate().map(|(i, put)| associator.reconsider(&image(i), put, &map)).collect();
+    let again = now.iter().enumerate().map(|(i, put)| associator.reassociate(&image(i), put, &map)).collect();
     [then, now, again].map(|names: Vec<Vec<Option<ObjectId>>>| {
         let truth = sequence.detections.iter().map(|detection| detection.object);
         identity(truth.zip(names.into_iter().flatten()).filter_map(|(truth, put)| Some((truth?, put))))
@@ -80,7 +85,7 @@ fn scores(settings: &Likelihood, sequence: &Sequence) -> [IdentityScores; 3] {
 }
 
 fn main() {
-    let mut settings: Value = serde_json::to_value(Likelihood::default()).unwrap();
+    let mut settings: Value = serde_json::to_value(LikelihoodAssociation::default()).unwrap();
     let (mut sequences, mut counts) = (vec![], 1);
     for argument in std::env::args().skip(1) {
         match argument.split_once('=') {
@@ -89,7 +94,7 @@ fn main() {
             None => sequences.push(argument),
         }
     }
-    let settings: Likelihood = from_value(settings).unwrap();
+    let settings: LikelihoodAssociation = from_value(settings).unwrap();
     let mut sum = 0.0;
     for name in &sequences {
         let scores = scores(&settings, &load(name));

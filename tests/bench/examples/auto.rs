@@ -9,7 +9,7 @@
 //! hundred. The last graph does not come from a file: a sphere of poses with so much rotational noise that
 //! its odometry is useless as an initial guess.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
-use manifactor_formats::pose_graph::{self, Options};
+use manifactor_formats::pose_graph::{self, PoseGraphOptions};
 use manifactor_geometry::{Between, Chordal, Se3};
 use manifactor_graph::{Graph, Key, Noise, Values};
 use manifactor_solve::{Auto, GaussNewton, Outcome, Silent, Start, solve};
@@ -30,7 +30,7 @@ fn main() {
     println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     let mut worst: f64 = 0.0;
     for path in std::env::args().skip(1) {
-        let loaded = pose_graph::read(&path, &Options::default()).unwrap();
+        let loaded = pose_graph::read(&path, &PoseGraphOptions::default()).unwrap();
         let name = Path::new(&path).file_stem().unwrap().to_string_lossy().into_owned();
         for times in TIMES {
             worst = worst.max(row(&name, times, &scaled(&loaded.graph, times), &loaded.values));

@@ -9,9 +9,9 @@
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::checked::Positive;
 use manifactor_quadric::{BoundingBox, Camera};
-use manifactor_slam::measurement::{Depth, Quantities};
+use manifactor_slam::measurement::{DepthMeasurement, Quantities};
 use manifactor_slam::recording;
-use manifactor_slam::sequence::{ClassScores, Detection, Frame, ObjectId, Opening};
+use manifactor_slam::sequence::{ClassScores, Detection, Frame, ObjectId, SequenceHeader};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -84,7 +84,7 @@ fn main() {
     };
     let (poses, labels) = (poses(&read("orbslam3_poses")), labels(&read("label_02")));
     let still = still(&labels, &poses);
-    let mut recorded = Opening::new(CAMERA).into_sequence();
+    let mut recorded = SequenceHeader::new(CAMERA).into_sequence();
     let frame = |(i, pose): (usize, &Se3)| Frame { timestamp: i as f64 * INTERVAL, world_from_camera: *pose };
     recorded.frames = poses.iter().enumerate().map(frame).collect();
     let mut named = 0;
@@ -105,7 +105,8 @@ fn main() {
             object,
             scores,
             bounding_box,
-            quantities: Positive::new(n[12]).map_or(Quantities::NONE, |z| Quantities::one(Depth(z))),
+            quantities: Positive::new(n[12])
+                .map_or(Quantities::NONE, |z| Quantities::one(DepthMeasurement(z))),
         });
     }
     recorded.detections.sort_by_key(|detection| detection.frame);

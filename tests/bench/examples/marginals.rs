@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p manifactor-bench --example marginals -- GRAPH.g2o…`: milliseconds, medians of nine.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
-use manifactor_formats::pose_graph::{self, Options};
+use manifactor_formats::pose_graph::{self, PoseGraphOptions};
 use manifactor_solve::{Auto, Problem, Silent, solve};
 use std::time::Instant;
 
@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("| graph | factorize | all | one, first | one, after |");
     println!("| --- | ---: | ---: | ---: | ---: |");
     for path in std::env::args().skip(1) {
-        let loaded = pose_graph::read(&path, &Options::default())?;
+        let loaded = pose_graph::read(&path, &PoseGraphOptions::default())?;
         let (graph, values) = (loaded.graph, loaded.values);
         let solution = solve(&graph, &values, &Auto::default(), &mut Silent)?;
         let key = values.iter().nth(values.len() / 2).ok_or("no variables")?.0.to_string();

@@ -9,8 +9,8 @@
 //! CPU times of one thread in milliseconds. The cost is ½ Σ ‖r‖² of the true factors at the end, including
 //! rejected ones, divided by that of their optimum.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
-use manifactor_formats::pose_graph::{self, Options};
-use manifactor_formats::replay::{Latencies, Replay};
+use manifactor_formats::pose_graph::{self, PoseGraphOptions};
+use manifactor_formats::replay::{GraphReplay, Latencies};
 use manifactor_geometry::{Between, Se2, Se3};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_smoother::{FactorId, Outliers, Smoother, SmootherSettings};
@@ -117,7 +117,7 @@ fn online(truth: &Graph, misled: &Misled) -> Line {
         places.entry(text(entry)).or_default().push(i);
     }
     let (mut times, mut ids): (Vec<f64>, Vec<(FactorId, usize)>) = (vec![], vec![]);
-    let mut replay = Replay::of(&misled.graph, &Values::new());
+    let mut replay = GraphReplay::of(&misled.graph, &Values::new());
     let (mut batches, mut trials) = (0, 0);
     while let Some(step) = replay.step(|key| session.estimate(key)).unwrap() {
         let begin = cpu_seconds();
@@ -169,7 +169,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     println!("| --- | ---: | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     for path in files {
-        let loaded = pose_graph::read(&path, &Options::default())?;
+        let loaded = pose_graph::read(&path, &PoseGraphOptions::default())?;
         let best = solve(&loaded.graph, &loaded.values, &manifactor_solve::Auto::default(), &mut Silent)?;
         let name = std::path::Path::new(&path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         for share in &shares {

@@ -5,8 +5,8 @@
 //! The initial value of each pose comes from its odometry, never from the file's vertices. Times are CPU
 //! times of one thread in milliseconds; the gap is (cost − optimum) / optimum, every N poses.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
-use manifactor_formats::pose_graph::{self, Options, PoseGraph, Repair};
-use manifactor_formats::replay::{Latencies, Replay};
+use manifactor_formats::pose_graph::{self, InformationRepair, PoseGraph, PoseGraphOptions};
+use manifactor_formats::replay::{GraphReplay, Latencies};
 use manifactor_smoother::{Smoother, SmootherSettings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 
@@ -17,12 +17,12 @@ fn cpu_seconds() -> f64 {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let (mut gaps, mut options, mut json, mut files) = (0, Options::default(), false, vec![]);
+    let (mut gaps, mut options, mut json, mut files) = (0, PoseGraphOptions::default(), false, vec![]);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--gaps" => gaps = arguments.next().ok_or("--gaps takes a number")?.parse()?,
-            "--clamp" => options.repair = Repair::Clamp,
+            "--clamp" => options.repair = InformationRepair::Clamp,
             "--json" => json = true,
             _ => files.push(argument),
         }
@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut session = Smoother::new(SmootherSettings::default());
         let (mut times, mut differences) = (vec![], vec![]);
         let (mut damped, mut batches) = (0, 0);
-        let mut replay = Replay::of(&graph, &values);
+        let mut replay = GraphReplay::of(&graph, &values);
         while let Some(step) = replay.step(|key| session.estimate(key))? {
             let begin = cpu_seconds();
             session.push(&step.factors, &step.values)?;

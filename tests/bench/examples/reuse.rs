@@ -11,20 +11,20 @@ use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
 use manifactor_slam::metrics::{Alignment, align, associate};
-use manifactor_slam::online::{FrameError, FrameReport, Located, Mapper};
+use manifactor_slam::online::{FrameError, FrameReport, Mapper, Relocalization};
 use manifactor_slam::output::map_of;
 use manifactor_slam::output::write_whole;
-use manifactor_slam::run::{Watch, online};
+use manifactor_slam::run::{StreamWatcher, online};
 use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::{Observation, Sequence};
-use manifactor_slam::source::Folders;
+use manifactor_slam::source::InputFolders;
 use manifactor_solve::Silent;
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
 /// The frames of a part of a sequence. Its odometry begins at a different pose, as after a restart.
 fn part(all: &Sequence, frames: Range<usize>) -> Sequence {
-    let mut part = all.opening().into_sequence();
+    let mut part = all.header().into_sequence();
     let observations = all.observations().skip(frames.start).take(frames.len());
     let first = all.frames[frames.start].world_from_camera;
     part.up = all.up.map(|up| Direction::new(first.rotation.inverse().act(&up)).unwrap());
@@ -60,12 +60,12 @@ fn rmse(sequence: &Sequence, truth_from_map: &Se3, trajectory: &[StampedPose]) -
 /// Records the frame of the relocalization, and the poses estimated from then on.
 #[derive(Default)]
 struct Found {
-    at: Option<(usize, Vec<StampedPose>, Located)>,
+    at: Option<(usize, Vec<StampedPose>, Relocalization)>,
     longest: f64,
 }
 
-impl Watch for Found {
-    fn frame(
+impl StreamWatcher for Found {
+    fn on_frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
         _: Option<&Observation>,
@@ -100,7 +100,7 @@ fn main() {
     let run = RunDocument::read(&document).unwrap();
     let variant = run.variants.iter().find(|v| v.name == "ours").or(run.variants.last()).unwrap();
     let data = std::env::var("MANIFACTOR_DATA").ok().map(Into::into);
-    let folders = Folders { data, document: run.folder.clone() };
+    let folders = InputFolders { data, document: run.folder.clone() };
     let sequence = variant.settings.source.load(&folders).unwrap();
     let settings = &variant.settings;
 

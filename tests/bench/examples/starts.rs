@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p manifactor-bench --example starts -- FILE...`
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
-use manifactor_formats::pose_graph::{self, Options};
+use manifactor_formats::pose_graph::{self, PoseGraphOptions};
 use manifactor_geometry::{Chordal, SpanningTree, Tree, certify};
 use manifactor_solve::{GaussNewton, GivenStart, LevenbergMarquardt, Optimizer, Silent, Start, solve};
 use std::time::Instant;
@@ -18,7 +18,7 @@ fn main() {
     let optimizers: [(&str, Box<dyn Optimizer>); 2] =
         [("lm", Box::new(LevenbergMarquardt::default())), ("gn", Box::new(GaussNewton::default()))];
     for path in std::env::args().skip(1) {
-        let loaded = pose_graph::read(&path, &Options::default()).unwrap();
+        let loaded = pose_graph::read(&path, &PoseGraphOptions::default()).unwrap();
         let name = std::path::Path::new(&path).file_stem().unwrap().to_string_lossy().into_owned();
         for (start, strategy) in &starts {
             let mut best = f64::INFINITY;

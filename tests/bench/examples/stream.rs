@@ -7,7 +7,7 @@ use manifactor_config::Document;
 use manifactor_formats::replay::Latencies;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::report::{TrajectoryReport, VariantReport};
-use manifactor_slam::run::{Run, Watch};
+use manifactor_slam::run::{Run, StreamWatcher};
 use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::Observation;
 use manifactor_solve::{Optimizer, Silent};
@@ -24,8 +24,8 @@ struct Gaps {
     longest: Vec<(f64, usize, String)>,
 }
 
-impl Watch for Gaps {
-    fn frame(
+impl StreamWatcher for Gaps {
+    fn on_frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
         _: Option<&Observation>,
@@ -39,7 +39,7 @@ impl Watch for Gaps {
             }
             let what = format!(
                 "born {} revised {} redone {:?} damped {:?} passes {:?} batch {:?}",
-                report.born.len(),
+                report.initialized.len(),
                 report.revised.len(),
                 report.updates.iter().map(|u| u.refactorized).collect::<Vec<_>>(),
                 report.updates.iter().map(|u| u.damped).collect::<Vec<_>>(),
@@ -49,7 +49,7 @@ impl Watch for Gaps {
             self.longest.push((seconds, report.frame, what));
         }
         if self.every > 0 && self.frames.is_multiple_of(self.every) {
-            let session = mapper.session();
+            let session = mapper.smoother();
             let cost = session.cost();
             let batch = session.finish(&*self.solver, &mut Silent).unwrap().outcome.final_cost;
             self.found.push((cost - batch) / batch.max(1e-9));
@@ -79,8 +79,8 @@ fn main() {
         let mut run = Run::new(&document, data.clone().map(Into::into));
         let solver = variant.settings.solver.clone();
         let mut gaps = Gaps { every, frames: 0, solver, found: vec![], batches: vec![], longest: vec![] };
-        let (_, report) = run.variant_online(variant, &mut gaps, &mut Silent).unwrap();
-        let (_, batch) = run.variant(variant, &mut Silent).unwrap();
+        let (_, report) = run.run_variant_online(variant, &mut gaps, &mut Silent).unwrap();
+        let (_, batch) = run.run_variant(variant, &mut Silent).unwrap();
         tell(&report, &batch);
         gaps.found.sort_by(f64::total_cmp);
         if let (Some(median), Some(most)) = (gaps.found.get(gaps.found.len() / 2), gaps.found.last()) {
@@ -110,8 +110,8 @@ fn tell(report: &VariantReport, batch: &VariantReport) {
     println!(
         "  {} objects live ({} born, {} withdrawn, {} revised, {} refused), {} at the end, {} in batch; {} boxes, {}",
         online.objects,
-        online.born,
-        online.withdrawn,
+        online.initialized,
+        online.removed,
         online.revised,
         online.refusals,
         report.counts.objects,

@@ -4,8 +4,8 @@
 //! pass drives the graph again from the end of the previous pass, with new names; factors to marginalized
 //! poses are left out. Times are CPU times of one thread in milliseconds.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
-use manifactor_formats::pose_graph::{self, Options, PoseGraph};
-use manifactor_formats::replay::{Latencies, Replay};
+use manifactor_formats::pose_graph::{self, PoseGraph, PoseGraphOptions};
+use manifactor_formats::replay::{GraphReplay, Latencies};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_smoother::{Smoother, SmootherSettings, Span, Window};
 use std::num::NonZeroUsize;
@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             _ => path = argument,
         }
     }
-    let PoseGraph { graph, values, .. } = pose_graph::read(&path, &Options::default())?;
+    let PoseGraph { graph, values, .. } = pose_graph::read(&path, &PoseGraphOptions::default())?;
     let window = Some(Window::from(Span::Poses(NonZeroUsize::new(poses).unwrap())));
     let mut session = Smoother::new(SmootherSettings { window, ..SmootherSettings::default() });
     let name = |pass: usize, key: &Key| Key::from(format!("{pass}:{key}"));
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("| pass | left out | p50 | p99 | max | MB of fronts | MB of the process | bytes saved |");
     println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     for pass in 0..passes {
-        let (mut replay, mut times, mut left_out) = (Replay::of(&graph, &values), vec![], 0);
+        let (mut replay, mut times, mut left_out) = (GraphReplay::of(&graph, &values), vec![], 0);
         // estimates of the pass without a window, from which odometry continues
         let mut all = Values::new();
         while let Some(step) = replay.step(|key| {

@@ -8,8 +8,8 @@ use manifactor::slam::output::write_whole;
 use manifactor::slam::report::VariantReport;
 use manifactor::slam::run::{Run, estimate};
 use manifactor::slam::run_document::RunDocument;
-use manifactor::slam::settings::Settings;
-use manifactor::slam::source::Folders;
+use manifactor::slam::settings::RunSettings;
+use manifactor::slam::source::InputFolders;
 use manifactor_bench as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -43,14 +43,14 @@ trajectory = { frames = 240, seed = 1 }
 detector = { missed = 0.1, misclassified = 0.05, sigma_px = 3.0 }
 "#;
 
-fn settings(text: &str, sets: &[&str]) -> Settings {
+fn settings(text: &str, sets: &[&str]) -> RunSettings {
     let mut document = Document::parse("run.toml", text, Format::Toml).unwrap();
     document.set(sets).unwrap();
     RunDocument::read(&document).unwrap().variants.remove(0).settings
 }
 
-fn report(settings: &Settings) -> VariantReport {
-    let sequence = settings.source.load(&Folders::default()).unwrap();
+fn report(settings: &RunSettings) -> VariantReport {
+    let sequence = settings.source.load(&InputFolders::default()).unwrap();
     estimate("run", Arc::new(sequence), settings, &mut Silent).unwrap().1
 }
 
@@ -70,13 +70,14 @@ fn the_likelihood_does_better_than_overlap() {
 fn objects_of_a_prior_map_are_found_again_by_their_outlines() {
     let folder = tempfile::tempdir().unwrap();
     let first = settings(TABLE, &[]);
-    let sequence = Arc::new(first.source.load(&Folders::default()).unwrap());
+    let sequence = Arc::new(first.source.load(&InputFolders::default()).unwrap());
     let (mapped, _) = estimate("first", sequence, &first, &mut Silent).unwrap();
     let file = folder.path().join("map.json");
     let map = map_of(&mapped, &first).unwrap();
     write_whole(&file, serde_json::to_string(&map).unwrap()).unwrap();
     let again = ["source.seed=2", "source.trajectory.seed=2"];
-    let start = settings(TABLE, &again).source.load(&Folders::default()).unwrap().frames[0].world_from_camera;
+    let start =
+        settings(TABLE, &again).source.load(&InputFolders::default()).unwrap().frames[0].world_from_camera;
     let file = format!("prior_map.file={}", file.display());
     let rotation = format!("prior_map.start.rotation={:?}", start.rotation.quaternion_xyzw());
     let translation = format!("prior_map.start.translation={:?}", start.translation.as_slice());
@@ -98,7 +99,7 @@ fn real_boxes_are_confused_by_overlap() {
         document.set(&[format!("association={{ type = '{association}' }}")]).unwrap();
         let run = RunDocument::read(&document).unwrap();
         let variant = run.variants.iter().find(|v| v.name == "Q C").unwrap();
-        let (_, report) = Run::new(&run, Some(data.clone())).variant(variant, &mut Silent).unwrap();
+        let (_, report) = Run::new(&run, Some(data.clone())).run_variant(variant, &mut Silent).unwrap();
         let found = scores(&report);
         assert!(found.f1 > 0.5 && found.f1 < 0.8, "{association}: {found:?}");
     }

@@ -37,7 +37,7 @@ pub fn experiment(data: &[u8]) {
     let mut left: Vec<_> = experiment.trials.iter().map(|trial| trial.labels.clone()).collect();
     for shard in ["1/3", "2/3", "3/3"] {
         let mut part = experiment.clone();
-        part.keep(shard.parse::<Shard>().unwrap_or_else(|e| panic!("{e}")));
+        part.restrict_to_shard(shard.parse::<Shard>().unwrap_or_else(|e| panic!("{e}")));
         for trial in part.trials {
             let place = left.iter().position(|labels| *labels == trial.labels);
             left.swap_remove(place.unwrap_or_else(|| panic!("{:?} is in two shards", trial.labels)));
@@ -86,7 +86,7 @@ pub fn trials(data: &[u8]) {
         };
         let whole = std::fs::read(&path).unwrap_or_default();
         assert!(bytes.starts_with(&whole), "a journal has other lines");
-        let found = journal.find(&TRIAL).cloned();
+        let found = journal.record_of(&TRIAL).cloned();
         let outcome = TrialOutcome::Failed { reason: "\u{2028}\n\"".to_owned() };
         let record = found.unwrap_or_else(|| TrialRecord {
             labels: TRIAL.labels.clone(),
@@ -97,6 +97,6 @@ pub fn trials(data: &[u8]) {
         journal.append(record.clone()).unwrap_or_else(|e| panic!("{e}"));
         drop(journal);
         let journal = open().unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(journal.find(&TRIAL), Some(&record));
+        assert_eq!(journal.record_of(&TRIAL), Some(&record));
     }
 }

@@ -6,7 +6,7 @@ use manifactor::slam::online::Mapper;
 use manifactor::slam::prior_map::PriorMap;
 use manifactor::slam::record::RunRecord;
 use manifactor::slam::run_document::RunDocument;
-use manifactor::slam::sequence::{Frame, Observation, Opening};
+use manifactor::slam::sequence::{Frame, Observation, SequenceHeader};
 use manifactor::viz::{Theme, ply, run_pictures};
 use std::path::Path;
 
@@ -30,13 +30,13 @@ pub fn prior_map(data: &[u8]) {
     let document = Document::parse(&name, text, Format::Toml).unwrap_or_else(|e| panic!("{e}"));
     let run = RunDocument::read(&document).unwrap_or_else(|e| panic!("{e}"));
     let settings = &run.variants[0].settings;
-    let mut mapper = Mapper::new(Opening::new(super::stream::camera()), settings);
+    let mut mapper = Mapper::new(SequenceHeader::new(super::stream::camera()), settings);
     for timestamp in [0.0, 1.0] {
         let frame = Frame { timestamp, world_from_camera: Se3::identity() };
         let observation = Observation { frame, detections: vec![], accelerometer: vec![], unused: vec![] };
         // a map whose numbers overflow is refused with the first frame
-        let _ = mapper.take(&observation);
-        is_finite(&mapper.session().estimates());
+        let _ = mapper.add_frame(&observation);
+        is_finite(&mapper.smoother().estimates());
     }
 }
 

@@ -5,15 +5,15 @@ use manifactor::geometry::{Se3, So3};
 use manifactor::graph::checked::Positive;
 use manifactor::nalgebra::Vector3;
 use manifactor::quadric::BoundingBox;
-use manifactor::slam::measurement::{Depth, Quantities};
+use manifactor::slam::measurement::{DepthMeasurement, Quantities};
 use manifactor::slam::online::Mapper;
 use manifactor::slam::output::map_of;
 use manifactor::slam::prior_map::PriorMap;
 use manifactor::slam::run_document::RunDocument;
 use manifactor::slam::sequence::{
-    Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Opening,
+    Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, SequenceHeader,
 };
-use manifactor::slam::settings::Settings;
+use manifactor::slam::settings::RunSettings;
 use manifactor::smoother::Smoother;
 use std::sync::{Arc, LazyLock};
 
@@ -35,36 +35,36 @@ const SETTINGS: [&str; 5] = [
 /// A line is `frame TIME TX TY TZ RX RY RZ`, `box OBJECT XMIN YMIN XMAX YMAX SCORE CLASS DEPTH`, or `feel
 /// TIME X Y Z`.
 pub fn mapper(data: &[u8]) {
-    static READ: LazyLock<Vec<Settings>> = LazyLock::new(|| SETTINGS.map(settings).to_vec());
+    static READ: LazyLock<Vec<RunSettings>> = LazyLock::new(|| SETTINGS.map(settings).to_vec());
     let text = String::from_utf8_lossy(data);
     let number = text.split_whitespace().next().and_then(|word| word.parse::<usize>().ok());
     let settings = &READ[number.unwrap_or_default() % SETTINGS.len()];
-    let opening = Opening::new(super::stream::camera());
+    let opening = SequenceHeader::new(super::stream::camera());
     let new = || Mapper::new(opening.clone(), settings);
     // the second one gets only the frames that the first one accepts
     let (mut mapper, mut clean) = (new(), new());
     let mut sequence = opening.clone().into_sequence();
     for observation in observations(&text) {
-        let taken = mapper.take(&observation);
-        is_finite(&mapper.session().estimates());
+        let taken = mapper.add_frame(&observation);
+        is_finite(&mapper.smoother().estimates());
         if let Ok(report) = taken {
             let number = |x: &f64| x.is_finite();
             assert!(report.pose.translation.iter().all(number), "a pose is not finite");
             let again =
-                clean.take(&observation).unwrap_or_else(|e| panic!("a refused frame left a trace: {e}"));
-            assert_eq!(report.names, again.names);
+                clean.add_frame(&observation).unwrap_or_else(|e| panic!("a refused frame left a trace: {e}"));
+            assert_eq!(report.box_objects, again.box_objects);
             sequence.push(observation);
         }
-        assert_eq!(mapper.live(), clean.live(), "a refused frame left a trace");
+        assert_eq!(mapper.live_poses(), clean.live_poses(), "a refused frame left a trace");
     }
-    mapper.settle();
-    is_finite(&mapper.session().estimates());
-    clean.settle();
-    assert_eq!(estimates(mapper.session()), estimates(clean.session()), "a refused frame left a trace");
-    let saved = mapper.session().save().unwrap_or_else(|e| panic!("{e}"));
+    mapper.finish_association();
+    is_finite(&mapper.smoother().estimates());
+    clean.finish_association();
+    assert_eq!(estimates(mapper.smoother()), estimates(clean.smoother()), "a refused frame left a trace");
+    let saved = mapper.smoother().save().unwrap_or_else(|e| panic!("{e}"));
     let loaded = Smoother::load(&saved).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(loaded.save().unwrap_or_else(|e| panic!("{e}")), saved);
-    assert_eq!(estimates(&loaded), estimates(mapper.session()));
+    assert_eq!(estimates(&loaded), estimates(mapper.smoother()));
     let Ok(estimate) = mapper.finish(Arc::new(sequence), &mut third()) else { return };
     is_finite(&estimate.solution.values);
     let Ok(map) = map_of(&estimate, settings) else { return };
@@ -76,7 +76,7 @@ pub fn mapper(data: &[u8]) {
     assert_alike(&json(&map), &json(&again));
 }
 
-fn settings(text: &str) -> Settings {
+fn settings(text: &str) -> RunSettings {
     let text = format!("source = {{ type = \"simulated\" }}\n{text}");
     let run = Document::parse("run.toml", text, Format::Toml);
     let run = run.and_then(|document| RunDocument::read(&document)).unwrap_or_else(|e| panic!("{e}"));
@@ -117,7 +117,7 @@ fn observations(text: &str) -> Vec<Observation> {
                         .parse()
                         .ok()
                         .and_then(|depth| Positive::new(depth).ok())
-                        .map_or(Quantities::NONE, |depth| Quantities::one(Depth(depth))),
+                        .map_or(Quantities::NONE, |depth| Quantities::one(DepthMeasurement(depth))),
                 });
             }
             ("feel", Some(last)) => {

@@ -1,7 +1,7 @@
 //! Pose graphs, replayed pose by pose.
 use super::{SOLVED, is_finite, third};
-use manifactor::formats::pose_graph::{self, Options};
-use manifactor::formats::replay::Replay;
+use manifactor::formats::pose_graph::{self, PoseGraphOptions};
+use manifactor::formats::replay::GraphReplay;
 use manifactor::graph::GraphError;
 use manifactor::prelude::*;
 use manifactor::smoother::{ChangeError, Smoother, SmootherSettings};
@@ -10,7 +10,9 @@ use std::collections::HashSet;
 /// Replays g2o and TORO files pose by pose. Each factor and each variable occurs once, and all estimates
 /// are finite.
 pub fn replay(data: &[u8]) {
-    let Ok(read) = pose_graph::parse(&String::from_utf8_lossy(data), "graph.g2o", &Options::default()) else {
+    let Ok(read) =
+        pose_graph::parse(&String::from_utf8_lossy(data), "graph.g2o", &PoseGraphOptions::default())
+    else {
         return;
     };
     let (graph, values) = (read.graph, read.values);
@@ -18,7 +20,7 @@ pub fn replay(data: &[u8]) {
         return;
     }
     let mut session = Smoother::new(SmootherSettings::default());
-    let mut steps = Replay::of(&graph, &values);
+    let mut steps = GraphReplay::of(&graph, &values);
     let (mut factors, mut keys, has_poses) = (0, HashSet::new(), !steps.is_empty());
     loop {
         let left = steps.len();

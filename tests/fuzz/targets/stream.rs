@@ -4,9 +4,11 @@ use manifactor::formats::whole::{checked_line, read_checked_line};
 use manifactor::geometry::Se3;
 use manifactor::quadric::Camera;
 use manifactor::slam::journal::journaled;
-use manifactor::slam::sequence::{Frame, Observation, Opening};
-use manifactor::slam::source::{CameraChoice, Folders, JsonLines, Source, SourceError, line};
-use manifactor::slam::stream::Stream;
+use manifactor::slam::sequence::{Frame, Observation, SequenceHeader};
+use manifactor::slam::source::{
+    CameraChoice, InputFolders, JsonLines, SequenceSource, SourceError, format_line,
+};
+use manifactor::slam::stream::FrameStream;
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -29,14 +31,14 @@ pub fn json_lines(data: &[u8]) {
             Err(error) => panic!("{error}"),
         }
     }
-    let text: String = frames.iter().map(|frame| line(frame) + "\n").collect();
+    let text: String = frames.iter().map(|frame| format_line(frame) + "\n").collect();
     let again = lines(folder.path(), text.as_bytes());
     assert_eq!(again.len(), frames.len());
     for (frame, again) in frames.iter().zip(again) {
         let again = again.unwrap_or_else(|e| panic!("{e}"));
         same_frame(frame, &again);
         // rounding of a rotation ends
-        assert_alike(&json(&line(frame)), &json(&line(&again)));
+        assert_alike(&json(&format_line(frame)), &json(&format_line(&again)));
     }
 }
 
@@ -53,7 +55,8 @@ fn kept(bytes: &[u8]) {
     std::fs::write(&path, bytes).unwrap_or_else(|e| panic!("{e}"));
     let read = |new: &[Observation]| {
         let new: Vec<_> = new.iter().cloned().map(Ok).collect();
-        let stream = journaled(Stream::new(Opening::new(camera()), new.into_iter()), &path, FINGERPRINT)?;
+        let stream =
+            journaled(FrameStream::new(SequenceHeader::new(camera()), new.into_iter()), &path, FINGERPRINT)?;
         let frames = stream.observations.map(|frame| frame.unwrap_or_else(|e| panic!("{e}")));
         Ok::<_, manifactor::formats::journal::JournalError>(frames.collect::<Vec<_>>())
     };
@@ -115,7 +118,7 @@ fn lines(folder: &Path, bytes: &[u8]) -> Vec<Result<Observation, SourceError>> {
         ground_truth: None,
         up: None,
     };
-    let folders = Folders { data: None, document: folder.into() };
+    let folders = InputFolders { data: None, document: folder.into() };
     let stream = source.open(&folders).unwrap_or_else(|e| panic!("{e}"));
     stream.map_or(vec![], |stream| stream.observations.collect())
 }

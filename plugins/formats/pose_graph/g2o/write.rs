@@ -2,7 +2,7 @@
 use crate::error::FormatError;
 use crate::pose_graph::record::exchange_halves;
 use crate::text::write_text;
-use crate::words::{count, omitted};
+use crate::words::{count, omission_notes};
 use manifactor_geometry::{BearingRange2, Between, Landmark, Point2, Point3, Position, Prior, Se2, Se3};
 use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Manifold, Values, Variable};
 use nalgebra::DMatrix;
@@ -11,7 +11,7 @@ use std::path::Path;
 
 /// Parts of a graph that g2o cannot express and that were omitted.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Omitted {
+pub struct G2oOmissions {
     /// Factors without an equivalent in g2o, by type name.
     pub factors: BTreeMap<&'static str, usize>,
     /// Variables that are neither poses nor points, by type name.
@@ -24,10 +24,10 @@ pub struct Omitted {
     pub renamed: Vec<(Key, u64)>,
 }
 
-impl Omitted {
+impl G2oOmissions {
     /// Returns the omitted parts as text.
     pub fn notes(&self) -> Vec<String> {
-        let mut notes = omitted("g2o", &self.variables, &self.factors);
+        let mut notes = omission_notes("g2o", &self.variables, &self.factors);
         if self.losses > 0 {
             notes.push(format!("g2o cannot express robust losses: {} left out", self.losses));
         }
@@ -47,8 +47,8 @@ impl Omitted {
 ///
 /// Numbers are written with all digits. Values, measurements and information read back bit for bit if the
 /// noise is an information matrix, otherwise up to rounding.
-pub fn format(graph: &Graph, values: &Values) -> (String, Omitted) {
-    let mut writer = Writer { ids: HashMap::new(), text: String::new(), omitted: Omitted::default() };
+pub fn format(graph: &Graph, values: &Values) -> (String, G2oOmissions) {
+    let mut writer = Writer { ids: HashMap::new(), text: String::new(), omitted: G2oOmissions::default() };
     writer.number(values);
     for (key, variable) in values.iter() {
         writer.vertex(key, variable);
@@ -74,7 +74,7 @@ pub fn format(graph: &Graph, values: &Values) -> (String, Omitted) {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write(path: impl AsRef<Path>, graph: &Graph, values: &Values) -> Result<Omitted, FormatError> {
+pub fn write(path: impl AsRef<Path>, graph: &Graph, values: &Values) -> Result<G2oOmissions, FormatError> {
     let (text, omitted) = format(graph, values);
     write_text(path.as_ref(), &text).map(|()| omitted)
 }
@@ -82,7 +82,7 @@ pub fn write(path: impl AsRef<Path>, graph: &Graph, values: &Values) -> Result<O
 struct Writer {
     ids: HashMap<Key, u64>,
     text: String,
-    omitted: Omitted,
+    omitted: G2oOmissions,
 }
 
 fn value<M: Manifold>(variable: &dyn Variable) -> Option<&M> {

@@ -25,7 +25,7 @@ fn ball(centre: [f64; 3], radius: f64) -> DualQuadric {
 /// Kind of each side: 0 if the end of the outline is visible, 1 if it is cut off, 2 if the side is the
 /// border.
 fn what_ends(factor: &BoundingBoxFactor, pose: &Se3, quadric: &DualQuadric) -> Option<[u8; 4]> {
-    let sides = factor.sides(&Ellipsoid::seen(pose, quadric))?;
+    let sides = factor.sides(&Ellipsoid::in_camera_frame(pose, quadric))?;
     Some(sides.map(|side| match side {
         Side::Touched { slope: 0.0, .. } => 0,
         Side::Touched { .. } => 1,
@@ -48,7 +48,7 @@ fn jacobian_law(model: BoxModel) {
         let factor = factor(camera, model);
         let mut law = JacobianLaw { step: 1e-3, ..JacobianLaw::default() };
         // Differences of huge numbers have few accurate digits.
-        let outline = Ellipsoid::seen(&pose, &quadric).outline(&camera);
+        let outline = Ellipsoid::in_camera_frame(&pose, &quadric).outline(&camera);
         let digits_lost = 1.0 + outline.xx.max(outline.yy).sqrt() / 300.0;
         law.analytic *= digits_lost;
         law.numeric *= digits_lost;
@@ -84,7 +84,7 @@ fn moving_the_world_changes_nothing() {
 }
 
 fn well_in_front(pose: &Se3, quadric: &DualQuadric) -> bool {
-    let seen = Ellipsoid::seen(pose, quadric);
+    let seen = Ellipsoid::in_camera_frame(pose, quadric);
     seen.axes.row(2).norm() < 0.9 * seen.centroid.z && seen.axes.column_iter().all(|a| a.norm() > 0.05)
 }
 
@@ -162,9 +162,9 @@ fn whether_it_is_defined_is_decided_alike_everywhere() {
         let factor = factor(camera, BoxModel::Standard);
         let defined = factor.is_defined((&pose, &quadric));
         assert_eq!(defined, factor.predict(&pose, &quadric).is_some());
-        assert_eq!(defined, Ellipsoid::seen(&pose, &quadric).is_in_front());
+        assert_eq!(defined, Ellipsoid::in_camera_frame(&pose, &quadric).is_in_front());
         if defined {
-            assert!(Ellipsoid::seen(&pose, &quadric).dual_conic(&camera).0[(2, 2)] < 0.0);
+            assert!(Ellipsoid::in_camera_frame(&pose, &quadric).dual_conic(&camera).0[(2, 2)] < 0.0);
             assert!(!quadric.contains(&pose.translation));
         }
         Ok(())
@@ -220,7 +220,7 @@ fn an_object_that_leaves_the_image_leaves_the_truncated_factor() {
         assert!(seen || !defined, "it comes back");
         seen = defined;
         if let Some(b) = factor.predict(&pose, &quadric) {
-            assert!(b.width() >= VISIBLE && b.height() >= VISIBLE);
+            assert!(b.width() >= MIN_VISIBLE_PX && b.height() >= MIN_VISIBLE_PX);
             last = b.width();
             let l = Factor::erased(&factor).linearize(&[&pose, &quadric]).unwrap();
             assert!(l.jacobians.iter().flatten().all(|x| x.is_finite()));

@@ -6,7 +6,7 @@ use super::sightings::Sighting;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Manifold, Residual};
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric, QuadricPrior};
-use manifactor_recording::measurement::{Errors, Rows};
+use manifactor_recording::measurement::{MeasurementSigmas, ResidualRows};
 use nalgebra::{Cholesky, SMatrix, SVector, Vector3, Vector4};
 
 type Matrix9 = SMatrix<f64, 9, 9>;
@@ -20,14 +20,14 @@ pub(super) struct BoxNoise {
     /// Standard deviation of a side, relative to width and height.
     pub of_size: f64,
     /// Noise of further measurements of a detection.
-    pub others: Errors,
+    pub others: MeasurementSigmas,
 }
 
 /// Prior of an object, independent of its later boxes.
 #[derive(Debug, Clone)]
-pub(super) enum Belief {
+pub(super) enum ObjectPrior {
     /// From the first box.
-    Seen(FirstSight),
+    FirstBox(FirstBoxPrior),
     /// From a prior map.
     Known {
         /// Ellipsoid in the prior map.
@@ -39,7 +39,7 @@ pub(super) enum Belief {
 
 /// Prior of an object from its first box.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct FirstSight {
+pub(super) struct FirstBoxPrior {
     /// Ellipsoid at the assumed distance.
     quadric: DualQuadric,
     /// Camera centre of the first box.
@@ -52,15 +52,15 @@ pub(super) struct FirstSight {
 
 /// An ellipsoid with its covariance.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Fitted {
+pub(super) struct FittedEllipsoid {
     pub quadric: DualQuadric,
     /// In the tangent space of the quadric.
     pub covariance: Matrix9,
 }
 
-impl Fitted {
+impl FittedEllipsoid {
     /// Returns whether one of two ellipsoids contains the centre of the other.
-    pub(super) fn is_where(&self, other: &Self) -> bool {
+    pub(super) fn overlaps(&self, other: &Self) -> bool {
         let (own, others) = (&self.quadric, &other.quadric);
         own.contains(&others.centroid()) || others.contains(&own.centroid())
     }
@@ -68,17 +68,17 @@ impl Fitted {
 
 /// Standard deviation of the logarithm of a semi-axis, relative to the one from the first box and the
 /// distance.
-const SHAPE: f64 = 0.5;
+const SHAPE_SIGMA: f64 = 0.5;
 /// Standard deviation of the rotation, in radians.
-const TURN: f64 = 0.5;
+const ROTATION_SIGMA_RAD: f64 = 0.5;
 /// Maximum number of steps of a fit.
-const STEPS: usize = 8;
+const MAX_STEPS: usize = 8;
 /// The fit ends when a step reduces the cost by less than this share.
-const ENOUGH: f64 = 1e-3;
+const MIN_RELATIVE_DECREASE: f64 = 1e-3;
 /// Squared scale of Cauchy's loss: squared residuals beyond it are down-weighted.
-const WIDTH: f64 = 9.0;
+const CAUCHY_SCALE_SQUARED: f64 = 9.0;
 /// Cost of a box if the ellipsoid has no projection in its image.
-const LOST: f64 = 40.0;
+const INVISIBLE_COST: f64 = 40.0;
 
 impl BoxNoise {
     /// Returns the standard deviations of the sides.
@@ -88,7 +88,7 @@ impl BoxNoise {
     }
 }
 
-impl Belief {
+impl ObjectPrior {
     /// Returns the prior of an object seen once, at `depth` metres, with the standard deviation `spread` of
     /// its logarithm.
     pub(super) fn new(seen: &Sighting, camera: &Camera, depth: f64, spread: f64) -> Self {
@@ -100,11 +100,11 @@ impl Belief {
         let (x, y) = (size(b.width(), camera.fx), size(b.height(), camera.fy));
         let pose = Se3::new(seen.world_from_camera.rotation, centre);
         let quadric = DualQuadric { pose, semi_axes: Vector3::new(x, y, (x * y).sqrt()) };
-        Self::Seen(FirstSight { quadric, eye, distance: (centre - eye).norm(), spread })
+        Self::FirstBox(FirstBoxPrior { quadric, eye, distance: (centre - eye).norm(), spread })
     }
 
     /// Returns the prior of an object with the mean and covariance of an estimate.
-    pub(super) fn known(fitted: &Fitted) -> Self {
+    pub(super) fn from_estimate(fitted: &FittedEllipsoid) -> Self {
         let information = Cholesky::new(fitted.covariance).map(|factor| factor.inverse());
         let root = information.and_then(Cholesky::new).map(|factor| factor.l().transpose());
         // a covariance that was read from a file is positive definite
@@ -112,9 +112,9 @@ impl Belief {
     }
 
     /// Returns the ellipsoid that a fit starts from.
-    pub(super) fn first(&self) -> DualQuadric {
+    pub(super) fn initial_quadric(&self) -> DualQuadric {
         match self {
-            Self::Seen(first) => first.quadric,
+            Self::FirstBox(first) => first.quadric,
             Self::Known { quadric, .. } => *quadric,
         }
     }
@@ -122,7 +122,7 @@ impl Belief {
     /// Returns the residual of the prior and its Jacobian.
     fn rows(&self, quadric: &DualQuadric) -> (Vector9, Matrix9) {
         match self {
-            Self::Seen(first) => first.rows(quadric),
+            Self::FirstBox(first) => first.rows(quadric),
             Self::Known { quadric: value, root } => {
                 let mut jacobians = (Matrix9::zeros(),);
                 let r = QuadricPrior { value: *value }.linearize((quadric,), &[true; 9], &mut jacobians);
@@ -132,7 +132,7 @@ impl Belief {
     }
 }
 
-impl FirstSight {
+impl FirstBoxPrior {
     /// Returns the residual of the distance, three semi-axes and three angles. The last two rows are zero.
     fn rows(&self, quadric: &DualQuadric) -> (Vector9, Matrix9) {
         let away = quadric.centroid() - self.eye;
@@ -144,20 +144,20 @@ impl FirstSight {
         r[0] = log / self.spread;
         for c in 0..3 {
             j[(0, 3 + c)] = by_place[c] / self.spread;
-            r[1 + c] = ((quadric.semi_axes[c] / self.quadric.semi_axes[c]).ln() - log) / SHAPE;
+            r[1 + c] = ((quadric.semi_axes[c] / self.quadric.semi_axes[c]).ln() - log) / SHAPE_SIGMA;
             for k in 0..3 {
-                j[(1 + c, 3 + k)] = -by_place[k] / SHAPE;
+                j[(1 + c, 3 + k)] = -by_place[k] / SHAPE_SIGMA;
             }
-            j[(1 + c, 6 + c)] = 1.0 / SHAPE;
-            r[4 + c] = turn[c] / TURN;
-            j[(4 + c, c)] = 1.0 / TURN;
+            j[(1 + c, 6 + c)] = 1.0 / SHAPE_SIGMA;
+            r[4 + c] = turn[c] / ROTATION_SIGMA_RAD;
+            j[(4 + c, c)] = 1.0 / ROTATION_SIGMA_RAD;
         }
         (r, j)
     }
 }
 
 /// The predicted box of an ellipsoid, with the Jacobians of its sides by pose and ellipsoid.
-pub(super) struct Predicted {
+pub(super) struct PredictedBox {
     pub bounding_box: BoundingBox,
     pub by_pose: SMatrix<f64, SIDES, 6>,
     pub by_quadric: SMatrix<f64, SIDES, 9>,
@@ -167,7 +167,7 @@ pub(super) struct Predicted {
 pub(super) const SIDES: usize = 4;
 
 /// Predicts the box of an ellipsoid; `None` if no part of it is in the image.
-pub(super) fn predict(pose: &Se3, quadric: &DualQuadric, camera: &Camera) -> Option<Predicted> {
+pub(super) fn predict(pose: &Se3, quadric: &DualQuadric, camera: &Camera) -> Option<PredictedBox> {
     let nothing = BoundingBox { xmin: 0.0, ymin: 0.0, xmax: 0.0, ymax: 0.0 };
     let factor = BoundingBoxFactor { bounding_box: nothing, camera: *camera, model: BoxModel::Truncated };
     if !factor.is_defined((pose, quadric)) {
@@ -176,29 +176,29 @@ pub(super) fn predict(pose: &Se3, quadric: &DualQuadric, camera: &Camera) -> Opt
     let mut jacobians = (SMatrix::zeros(), SMatrix::zeros());
     let b = factor.linearize((pose, quadric), &[true; 15], &mut jacobians);
     let bounding_box = BoundingBox::new(b.into()).ok()?;
-    Some(Predicted { bounding_box, by_pose: jacobians.0, by_quadric: jacobians.1 })
+    Some(PredictedBox { bounding_box, by_pose: jacobians.0, by_quadric: jacobians.1 })
 }
 
 /// Fits an ellipsoid by damped Gauss-Newton steps from `start`; `None` if the data do not determine it.
 pub(super) fn fit(
-    belief: &Belief,
+    belief: &ObjectPrior,
     start: DualQuadric,
     seen: &[Sighting],
     camera: &Camera,
     noise: &BoxNoise,
-) -> Option<Fitted> {
+) -> Option<FittedEllipsoid> {
     let (mut quadric, mut damping) = (start, 1e-3);
-    let mut system = System::new(belief, &quadric, seen, camera, noise);
-    for _ in 0..STEPS {
+    let mut system = NormalEquations::new(belief, &quadric, seen, camera, noise);
+    for _ in 0..MAX_STEPS {
         let damped = system.h + Matrix9::from_diagonal(&system.h.diagonal()) * damping;
         let step = -Cholesky::new(damped)?.solve(&system.gradient);
         let next = quadric.retract(&step);
-        let there = System::new(belief, &next, seen, camera, noise);
+        let there = NormalEquations::new(belief, &next, seen, camera, noise);
         if there.cost >= system.cost {
             damping *= 10.0;
             continue;
         }
-        let is_done = system.cost - there.cost < ENOUGH * system.cost;
+        let is_done = system.cost - there.cost < MIN_RELATIVE_DECREASE * system.cost;
         (quadric, system) = (next, there);
         if is_done {
             break;
@@ -206,19 +206,19 @@ pub(super) fn fit(
         damping *= 0.1;
     }
     let covariance = Cholesky::new(system.h)?.inverse();
-    covariance.iter().all(|x| x.is_finite()).then_some(Fitted { quadric, covariance })
+    covariance.iter().all(|x| x.is_finite()).then_some(FittedEllipsoid { quadric, covariance })
 }
 
 /// Cost and normal equations of the fit of an ellipsoid.
-struct System {
+struct NormalEquations {
     cost: f64,
     gradient: Vector9,
     h: Matrix9,
 }
 
-impl System {
+impl NormalEquations {
     fn new(
-        belief: &Belief,
+        belief: &ObjectPrior,
         quadric: &DualQuadric,
         seen: &[Sighting],
         camera: &Camera,
@@ -227,12 +227,12 @@ impl System {
         let (r, j) = belief.rows(quadric);
         let mut all = Self { cost: r.norm_squared(), gradient: j.tr_mul(&r), h: j.tr_mul(&j) };
         for seen in seen {
-            match Whitened::new(quadric, seen, camera, noise) {
-                None => all.cost += LOST,
+            match WhitenedResidual::new(quadric, seen, camera, noise) {
+                None => all.cost += INVISIBLE_COST,
                 Some(whitened) => {
                     // Cauchy's loss of a detection as a whole
-                    let square = whitened.square / WIDTH;
-                    all.cost += WIDTH * square.ln_1p();
+                    let square = whitened.square / CAUCHY_SCALE_SQUARED;
+                    all.cost += CAUCHY_SCALE_SQUARED * square.ln_1p();
                     all.gradient += whitened.gradient / (1.0 + square);
                     all.h += whitened.h / (1.0 + square);
                 }
@@ -242,7 +242,7 @@ impl System {
     }
 }
 
-impl Predicted {
+impl PredictedBox {
     /// Returns the predicted minus the measured sides.
     pub(super) fn error(&self, b: &BoundingBox) -> Vector4<f64> {
         Vector4::from(self.bounding_box.bounds()) - Vector4::from(b.bounds())
@@ -250,13 +250,13 @@ impl Predicted {
 }
 
 /// The whitened residuals of a detection, summed over its box and further measurements: Σr², Jᵀr and JᵀJ.
-struct Whitened {
+struct WhitenedResidual {
     square: f64,
     gradient: Vector9,
     h: Matrix9,
 }
 
-impl Whitened {
+impl WhitenedResidual {
     /// Returns `None` if the ellipsoid has no box in this image.
     fn new(quadric: &DualQuadric, seen: &Sighting, camera: &Camera, noise: &BoxNoise) -> Option<Self> {
         let predicted = predict(&seen.world_from_camera, quadric, camera)?;
@@ -268,8 +268,9 @@ impl Whitened {
         );
         for measurement in seen.quantities.iter() {
             let Some(innovation) = measurement.innovation(&seen.world_from_camera, quadric) else { continue };
-            let sigma = measurement.deviations(&noise.others, &Rows::zeros());
-            let weights = Rows::from_fn(|i, _| if i < innovation.rows { 1.0 / sigma[i] } else { 0.0 });
+            let sigma = measurement.deviations(&noise.others, &ResidualRows::zeros());
+            let weights =
+                ResidualRows::from_fn(|i, _| if i < innovation.rows { 1.0 / sigma[i] } else { 0.0 });
             all.add(innovation.residual, &innovation.by_object, &weights);
         }
         Some(all)
@@ -290,8 +291,8 @@ pub(super) fn squared_error(
     camera: &Camera,
     noise: &BoxNoise,
 ) -> f64 {
-    let error = Whitened::new(quadric, seen, camera, noise);
-    error.map_or(LOST, |error| WIDTH * (error.square / WIDTH).ln_1p())
+    let error = WhitenedResidual::new(quadric, seen, camera, noise);
+    error.map_or(INVISIBLE_COST, |error| CAUCHY_SCALE_SQUARED * (error.square / CAUCHY_SCALE_SQUARED).ln_1p())
 }
 
 #[cfg(test)]
@@ -302,10 +303,10 @@ mod tests {
 
     const CAMERA: Camera =
         Camera { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 };
-    const NOISE: BoxNoise = BoxNoise { px: 2.0, of_size: 0.02, others: Errors { depth: 0.03 } };
+    const NOISE: BoxNoise = BoxNoise { px: 2.0, of_size: 0.02, others: MeasurementSigmas { depth: 0.03 } };
 
     /// A camera that is `x` metres to the right and looks straight ahead.
-    fn seen(x: f64, frame: usize, quadric: &DualQuadric) -> Sighting {
+    fn sighting_at(x: f64, frame: usize, quadric: &DualQuadric) -> Sighting {
         let world_from_camera = Se3 { translation: Vector3::x() * x, ..Se3::identity() };
         let bounding_box = predict(&world_from_camera, quadric, &CAMERA).unwrap().bounding_box;
         Sighting { frame, world_from_camera, bounding_box, quantities: Quantities::NONE }
@@ -318,9 +319,9 @@ mod tests {
 
     #[test]
     fn one_box_says_all_but_the_depth() {
-        let first = seen(0.0, 0, &ball(2.0));
-        let belief = Belief::new(&first, &CAMERA, 3.0, 0.5);
-        let found = fit(&belief, belief.first(), &[first], &CAMERA, &NOISE).unwrap();
+        let first = sighting_at(0.0, 0, &ball(2.0));
+        let belief = ObjectPrior::new(&first, &CAMERA, 3.0, 0.5);
+        let found = fit(&belief, belief.initial_quadric(), &[first], &CAMERA, &NOISE).unwrap();
         let away = found.quadric.centroid();
         assert!((away.z - 3.0).abs() < 0.1, "{away}");
         let ray = CAMERA.ray(Vector2::new(345.0, 240.0)) * 3.0;
@@ -331,9 +332,10 @@ mod tests {
 
     #[test]
     fn boxes_from_the_side_say_the_depth() {
-        let sightings: Vec<_> = (0..8).map(|i| seen(0.1 * f64::from(i), i as usize, &ball(2.0))).collect();
-        let belief = Belief::new(&sightings[0], &CAMERA, 3.0, 0.5);
-        let found = fit(&belief, belief.first(), &sightings, &CAMERA, &NOISE).unwrap();
+        let sightings: Vec<_> =
+            (0..8).map(|i| sighting_at(0.1 * f64::from(i), i as usize, &ball(2.0))).collect();
+        let belief = ObjectPrior::new(&sightings[0], &CAMERA, 3.0, 0.5);
+        let found = fit(&belief, belief.initial_quadric(), &sightings, &CAMERA, &NOISE).unwrap();
         assert!((found.quadric.centroid() - ball(2.0).centroid()).norm() < 0.1, "{}", found.quadric);
         assert!(found.covariance[(5, 5)].sqrt() < 0.15);
         assert!(squared_error(&found.quadric, &sightings[7], &CAMERA, &NOISE) < 1.0);
@@ -342,14 +344,14 @@ mod tests {
 
     #[test]
     fn derivatives_of_a_belief_are_right() {
-        let belief = Belief::new(&seen(0.0, 0, &ball(2.0)), &CAMERA, 3.0, 0.5);
+        let belief = ObjectPrior::new(&sighting_at(0.0, 0, &ball(2.0)), &CAMERA, 3.0, 0.5);
         check_derivatives(&belief);
         let covariance = Matrix9::from_fn(|r, c| if r == c { 0.04 } else { 0.01 });
-        check_derivatives(&Belief::known(&Fitted { quadric: ball(2.0), covariance }));
+        check_derivatives(&ObjectPrior::from_estimate(&FittedEllipsoid { quadric: ball(2.0), covariance }));
     }
 
-    fn check_derivatives(belief: &Belief) {
-        let at = belief.first().retract(&Vector9::from_fn(|i, _| 0.02 * (i as f64 - 4.0)));
+    fn check_derivatives(belief: &ObjectPrior) {
+        let at = belief.initial_quadric().retract(&Vector9::from_fn(|i, _| 0.02 * (i as f64 - 4.0)));
         let (_, j) = belief.rows(&at);
         for c in 0..9 {
             let step = Vector9::from_fn(|i, _| if i == c { 1e-6 } else { 0.0 });

@@ -1,5 +1,5 @@
 //! The most informative boxes of an object.
-use super::super::Map;
+use super::super::MapEstimate;
 use super::fit::SIDES;
 use manifactor_geometry::Se3;
 use manifactor_quadric::BoundingBox;
@@ -28,17 +28,17 @@ impl Sighting {
 pub(super) struct Sightings(Vec<Sighting>);
 
 /// Maximum number of sightings.
-const KEPT: usize = 24;
+const MAX_SIGHTINGS: usize = 24;
 /// Change of direction at which a sighting is new information, in radians.
-const ANGLE: f64 = 0.03;
+const NEW_DIRECTION_RAD: f64 = 0.03;
 /// Logarithmic change of the distance at which a sighting is new information.
-const DISTANCE: f64 = 0.1;
+const NEW_LOG_DISTANCE: f64 = 0.1;
 /// Number of frames after which a sighting is new information, because the detector errs differently by then.
-const FRAMES: usize = 30;
+const NEW_AFTER_FRAMES: usize = 30;
 
 impl Sightings {
     /// Creates the set from sightings in the order of frames.
-    pub(super) fn of(all: Vec<Sighting>) -> Self {
+    pub(super) fn from_sorted(all: Vec<Sighting>) -> Self {
         Self(all)
     }
 
@@ -53,9 +53,9 @@ impl Sightings {
             let from = |s: &Sighting| s.world_from_camera.translation - centre;
             let is_new = rest.iter().all(|other| {
                 let (a, b) = (from(last), from(other));
-                a.angle(&b) > ANGLE
-                    || (a.norm() / b.norm()).ln().abs() > DISTANCE
-                    || other.frame + FRAMES < last.frame
+                a.angle(&b) > NEW_DIRECTION_RAD
+                    || (a.norm() / b.norm()).ln().abs() > NEW_LOG_DISTANCE
+                    || other.frame + NEW_AFTER_FRAMES < last.frame
             });
             if !is_new {
                 self.0.pop();
@@ -71,7 +71,7 @@ impl Sightings {
     }
 
     /// Returns the sightings of both, in the order of frames.
-    pub(super) fn and(&self, others: &Self) -> Self {
+    pub(super) fn union_with(&self, others: &Self) -> Self {
         let mut all: Vec<Sighting> = self.0.iter().chain(&others.0).cloned().collect();
         all.sort_by_key(|sighting| sighting.frame);
         Self(all)
@@ -79,7 +79,7 @@ impl Sightings {
 
     /// Removes the sightings whose direction differs least from a neighbour, until few enough remain.
     pub(super) fn thin(&mut self, centre: &Vector3<f64>) {
-        while self.0.len() > KEPT {
+        while self.0.len() > MAX_SIGHTINGS {
             let from = |i: usize| self.0[i].world_from_camera.translation - centre;
             let news = |i: usize| {
                 let own = from(i);
@@ -91,7 +91,7 @@ impl Sightings {
     }
 
     /// Replaces the poses by their current estimates.
-    pub(super) fn renew(&mut self, map: &dyn Map) {
+    pub(super) fn update_poses(&mut self, map: &dyn MapEstimate) {
         for sighting in &mut self.0 {
             if let Some(pose) = map.pose(sighting.frame) {
                 sighting.world_from_camera = pose;

@@ -1,12 +1,12 @@
 //! The associator's model of one object.
-use super::super::Map;
-use super::Likelihood;
-use super::fit::{Belief, BoxNoise, Fitted, Predicted, SIDES, fit, predict};
+use super::super::MapEstimate;
+use super::LikelihoodAssociation;
+use super::fit::{BoxNoise, FittedEllipsoid, ObjectPrior, PredictedBox, SIDES, fit, predict};
 use super::sightings::{Sighting, Sightings};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
-use manifactor_recording::class::Aliases;
+use manifactor_recording::class::ClassAliases;
 use manifactor_recording::measurement::{Quantities, ROWS};
 use manifactor_recording::prior_map::PriorObject;
 use manifactor_recording::sequence::{ClassScores, Detection, ObjectId};
@@ -22,63 +22,63 @@ pub(super) struct Track {
     pub id: ObjectId,
     /// Summed score of the best class of each box.
     pub votes: IndexMap<String, f64>,
-    pub belief: Belief,
-    pub fitted: Fitted,
+    pub belief: ObjectPrior,
+    pub fitted: FittedEllipsoid,
     pub sightings: Sightings,
     /// All its boxes, at most one per frame, in order.
-    pub boxes: Vec<Seen>,
+    pub boxes: Vec<TrackBox>,
     /// Time of the last sighting, in seconds.
-    pub seen_at: Option<f64>,
+    pub last_seen_s: Option<f64>,
     /// Number of boxes at which it is compared with its neighbours again.
-    pub next_look: usize,
+    pub next_merge_check: usize,
 }
 
 /// A box of an object.
 #[derive(Debug, Clone)]
-pub(super) struct Seen {
+pub(super) struct TrackBox {
     /// Unit: seconds.
     pub timestamp: f64,
     /// Index among the detections of its frame.
-    pub place: usize,
+    pub index: usize,
     /// Its frame is the index in the map.
     pub detection: Detection,
 }
 
 /// Predicted box of an object, with the covariance of its sides.
-pub(super) struct Expected<'a> {
+pub(super) struct ExpectedBox<'a> {
     pose: &'a Se3,
-    fitted: &'a Fitted,
-    settings: &'a Likelihood,
+    fitted: &'a FittedEllipsoid,
+    settings: &'a LikelihoodAssociation,
     /// Variances of the drift of the camera: rad², m².
     drift: Vector6<f64>,
-    predicted: Predicted,
+    predicted: PredictedBox,
     /// Covariance of the sides, in square pixels.
     covariance: SMatrix<f64, SIDES, SIDES>,
 }
 
 /// Uncertainty of the offset between two objects, relative to their sizes, above which their places count as
 /// unknown.
-const VAGUE: f64 = 0.5;
+const MAX_OFFSET_SIGMA_OF_SIZE: f64 = 0.5;
 /// Boxes of an object at its first comparison with neighbours.
-const FIRST_LOOK: usize = 3;
+const FIRST_MERGE_CHECK_BOXES: usize = 3;
 /// Growth of the number of boxes until the next check.
-const MORE: f64 = 1.3;
+const CHECK_GROWTH: f64 = 1.3;
 
 impl Track {
     /// Creates the track of a new object; `None` if the fit of the ellipsoid fails.
     pub(super) fn new(
         id: ObjectId,
-        belief: Belief,
+        belief: ObjectPrior,
         first: &Sighting,
         camera: &Camera,
         noise: &BoxNoise,
     ) -> Option<Self> {
-        let fitted = fit(&belief, belief.first(), std::slice::from_ref(first), camera, noise)?;
-        Some(Self::bare(id, belief, fitted))
+        let fitted = fit(&belief, belief.initial_quadric(), std::slice::from_ref(first), camera, noise)?;
+        Some(Self::without_boxes(id, belief, fitted))
     }
 
     /// Creates a track without boxes.
-    pub(super) fn bare(id: ObjectId, belief: Belief, fitted: Fitted) -> Self {
+    pub(super) fn without_boxes(id: ObjectId, belief: ObjectPrior, fitted: FittedEllipsoid) -> Self {
         Self {
             id,
             votes: IndexMap::new(),
@@ -86,36 +86,37 @@ impl Track {
             fitted,
             sightings: Sightings::default(),
             boxes: vec![],
-            seen_at: None,
-            next_look: FIRST_LOOK,
+            last_seen_s: None,
+            next_merge_check: FIRST_MERGE_CHECK_BOXES,
         }
     }
 
     /// Creates the track of an object of a prior map.
-    pub(super) fn known(object: &PriorObject) -> Self {
-        let fitted = Fitted { quadric: object.quadric, covariance: object.covariance() };
+    pub(super) fn of_prior_object(object: &PriorObject) -> Self {
+        let fitted = FittedEllipsoid { quadric: object.quadric, covariance: object.covariance() };
         let votes = object.classes.sums().clone();
-        Self { votes, ..Self::bare(object.id, Belief::known(&fitted), fitted) }
+        Self { votes, ..Self::without_boxes(object.id, ObjectPrior::from_estimate(&fitted), fitted) }
     }
 
     /// Returns whether the object is part of a prior map.
     pub(super) fn is_known(&self) -> bool {
-        matches!(self.belief, Belief::Known { .. })
+        matches!(self.belief, ObjectPrior::Known { .. })
     }
 
     /// Returns whether one of two objects contains the centre of the other, and both places are known well
     /// enough.
-    pub(super) fn is_where(&self, other: &Self) -> bool {
-        self.fitted.is_where(&other.fitted) && self.spread(other) < VAGUE * self.sizes(other)
+    pub(super) fn overlaps(&self, other: &Self) -> bool {
+        self.fitted.overlaps(&other.fitted)
+            && self.offset_sigma(other) < MAX_OFFSET_SIGMA_OF_SIZE * self.size_sum(other)
     }
 
     /// Returns the standard deviation of the offset between two centres, in metres.
-    pub(super) fn spread(&self, other: &Self) -> f64 {
-        (self.place_covariance() + other.place_covariance()).trace().sqrt()
+    pub(super) fn offset_sigma(&self, other: &Self) -> f64 {
+        (self.centre_covariance() + other.centre_covariance()).trace().sqrt()
     }
 
     /// Returns the sum of the sizes of two objects, in metres.
-    pub(super) fn sizes(&self, other: &Self) -> f64 {
+    pub(super) fn size_sum(&self, other: &Self) -> f64 {
         self.fitted.quadric.semi_axes.norm() + other.fitted.quadric.semi_axes.norm()
     }
 
@@ -125,19 +126,19 @@ impl Track {
     }
 
     /// Returns the standard deviation of the centre, relative to the distance from the last camera.
-    pub(super) fn place_spread(&self) -> f64 {
+    pub(super) fn relative_centre_sigma(&self) -> f64 {
         let last = self.sightings.all().last();
         let distance = last.map_or(0.0, |last| self.distance(&last.world_from_camera));
-        self.place_covariance().trace().sqrt() / distance
+        self.centre_covariance().trace().sqrt() / distance
     }
 
     /// Returns the covariance of the centre, in square metres.
-    pub(super) fn place_covariance(&self) -> Matrix3<f64> {
+    pub(super) fn centre_covariance(&self) -> Matrix3<f64> {
         self.fitted.covariance.fixed_view::<3, 3>(3, 3).into_owned()
     }
 
     /// Adds the class of a box, with weight `times`: 1 adds it, -1 takes it back.
-    pub(super) fn vote(&mut self, scores: &ClassScores, aliases: &Aliases, times: f64) {
+    pub(super) fn add_class_vote(&mut self, scores: &ClassScores, aliases: &ClassAliases, times: f64) {
         if let Some((class, score)) = scores.best() {
             let votes = self.votes.entry(aliases.canonical(class)).or_default();
             *votes = (*votes + times * score).max(0.0);
@@ -145,20 +146,20 @@ impl Track {
     }
 
     /// Returns the share of a class among all votes; 1 without votes.
-    pub(super) fn share(&self, class: &str) -> f64 {
+    pub(super) fn class_share(&self, class: &str) -> f64 {
         let all: f64 = self.votes.values().sum();
         if all > 0.0 { self.votes.get(class).copied().unwrap_or_default() / all } else { 1.0 }
     }
 
     /// Predicts the box seen from `pose`, `seconds` after the last sighting; `None` if the object is not
     /// visible.
-    pub(super) fn expected<'a>(
+    pub(super) fn expected_box<'a>(
         &'a self,
         seconds: f64,
         pose: &'a Se3,
         camera: &Camera,
-        settings: &'a Likelihood,
-    ) -> Option<Expected<'a>> {
+        settings: &'a LikelihoodAssociation,
+    ) -> Option<ExpectedBox<'a>> {
         let predicted = predict(pose, &self.fitted.quadric, camera)?;
         let [turn, shift] = [settings.drift_rad, settings.drift_m].map(|drift| *drift * *drift * seconds);
         let drift = Vector6::new(turn, turn, turn, shift, shift, shift);
@@ -168,7 +169,7 @@ impl Track {
         let sigma = noise.deviations(&predicted.bounding_box) * *settings.lasting;
         let by_detector = SMatrix::from_diagonal(&sigma.component_mul(&sigma));
         let (fitted, covariance) = (&self.fitted, by_quadric + by_drift + by_detector);
-        Some(Expected { pose, fitted, settings, drift, predicted, covariance })
+        Some(ExpectedBox { pose, fitted, settings, drift, predicted, covariance })
     }
 
     /// Returns the intersection over union of a box with the projection of the ellipsoid.
@@ -178,25 +179,32 @@ impl Track {
     }
 
     /// Adds a box. If the fit fails, the ellipsoid stays unchanged.
-    pub(super) fn see(&mut self, seen: Seen, pose: Se3, map: &dyn Map, camera: &Camera, noise: &BoxNoise) {
-        self.seen_at = Some(seen.timestamp);
-        self.sightings.renew(map);
+    pub(super) fn add_box(
+        &mut self,
+        seen: TrackBox,
+        pose: Se3,
+        map: &dyn MapEstimate,
+        camera: &Camera,
+        noise: &BoxNoise,
+    ) {
+        self.last_seen_s = Some(seen.timestamp);
+        self.sightings.update_poses(map);
         self.sightings.add(seen.from(pose), &self.fitted.quadric.centroid());
         self.boxes.push(seen);
-        self.fit_again(camera, noise);
+        self.refit(camera, noise);
     }
 
     /// Fits the ellipsoid to the sightings, from the current one.
-    pub(super) fn fit_again(&mut self, camera: &Camera, noise: &BoxNoise) {
+    pub(super) fn refit(&mut self, camera: &Camera, noise: &BoxNoise) {
         let fitted = fit(&self.belief, self.fitted.quadric, self.sightings.all(), camera, noise);
         self.fitted = fitted.unwrap_or(self.fitted);
     }
 
     /// Returns the id if a comparison with the neighbours is due, and schedules the next one.
-    pub(super) fn is_due(&mut self, frame: usize) -> Option<ObjectId> {
-        let is_due = self.is_seen_in(frame) && self.boxes.len() >= self.next_look;
+    pub(super) fn due_merge_check(&mut self, frame: usize) -> Option<ObjectId> {
+        let is_due = self.is_seen_in(frame) && self.boxes.len() >= self.next_merge_check;
         is_due.then(|| {
-            self.next_look = self.next();
+            self.next_merge_check = self.next();
             self.id
         })
     }
@@ -206,11 +214,11 @@ impl Track {
     }
 
     fn next(&self) -> usize {
-        (self.boxes.len() as f64 * MORE).ceil() as usize + 1
+        (self.boxes.len() as f64 * CHECK_GROWTH).ceil() as usize + 1
     }
 }
 
-impl Seen {
+impl TrackBox {
     pub(super) fn frame(&self) -> usize {
         self.detection.frame
     }
@@ -222,7 +230,7 @@ impl Seen {
     }
 }
 
-impl Expected<'_> {
+impl ExpectedBox<'_> {
     /// Returns the predicted box without further measurements.
     pub(super) fn bounding_box(&self) -> &BoundingBox {
         &self.predicted.bounding_box

@@ -1,13 +1,13 @@
 //! The tracker of all objects: assigns detections, and learns from them.
-use super::super::{Associator, Image, Learned, Map, best_assignment};
-use super::Likelihood;
-use super::fit::Belief;
-use super::second_look::Past;
+use super::super::{Associator, Corrections, FrameDetections, MapEstimate, best_assignment};
+use super::LikelihoodAssociation;
+use super::fit::ObjectPrior;
+use super::second_look::PendingFrame;
 use super::sightings::Sighting;
-use super::track::{Seen, Track};
+use super::track::{Track, TrackBox};
 use manifactor_geometry::Se3;
 use manifactor_quadric::Camera;
-use manifactor_recording::class::Aliases;
+use manifactor_recording::class::ClassAliases;
 use manifactor_recording::prior_map::PriorObject;
 use manifactor_recording::sequence::{Detection, ObjectId};
 use std::collections::VecDeque;
@@ -15,124 +15,129 @@ use std::sync::Arc;
 
 /// Maximum number of boxes per frame; those with the highest scores are used. It bounds the time if a
 /// detector floods the frame.
-const BOXES: usize = 200;
-/// Number of boxes below which an object is forgotten when it is not seen for `PATIENCE`.
-pub(super) const FIRM: usize = 3;
+const MAX_BOXES_PER_FRAME: usize = 200;
+/// Number of boxes below which an object is forgotten when it is not seen for `TENTATIVE_TIMEOUT_S`.
+pub(super) const CONFIRMED_TRACK_BOXES: usize = 3;
 /// Time without a sighting after which such an object is forgotten, in seconds.
-const PATIENCE: f64 = 10.0;
+const TENTATIVE_TIMEOUT_S: f64 = 10.0;
 /// Maximum number of such objects.
-const WAITING: usize = 500;
+const MAX_TENTATIVE_TRACKS: usize = 500;
 /// Age of the last sighting of prior objects at the start of a run, in seconds. It sets the uncertainty of
 /// the start pose in the prior map.
-const AT_LARGE: f64 = 30.0;
+const PRIOR_OBJECT_AGE_S: f64 = 30.0;
 /// Relative uncertainty of the place, below which an object contributes to the usual depth.
-const KNOWN: f64 = 0.15;
+const KNOWN_RELATIVE_SIGMA: f64 = 0.15;
 
 /// The models of all objects.
 #[derive(Debug)]
 pub(super) struct Tracker {
-    pub settings: Likelihood,
+    pub settings: LikelihoodAssociation,
     pub camera: Camera,
-    pub aliases: Aliases,
+    pub aliases: ClassAliases,
     /// Sorted by id at the front: the objects of a prior map.
     pub tracks: Vec<Track>,
     pub next: u32,
     /// Nominal time of the last sighting of prior objects, in seconds.
-    began: Option<f64>,
+    start_time: Option<f64>,
     /// Frames that wait for their second look.
-    pub past: VecDeque<Past>,
+    pub pending_frames: VecDeque<PendingFrame>,
 }
 
 impl Associator for Tracker {
-    fn associate(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>> {
-        let mut names = self.put(image, map);
+    fn associate(&self, image: &FrameDetections<'_>, map: &dyn MapEstimate) -> Vec<Option<ObjectId>> {
+        let mut names = self.assign_known(image, map);
         let mut next = (self.next..).map(ObjectId);
         for i in best_scores(image.detections) {
             if names[i].is_none() {
                 // new objects have twins too
-                names[i] = self.twin(image.detections, &names, i).or_else(|| next.next());
+                names[i] = self.twin_object(image.detections, &names, i).or_else(|| next.next());
             }
         }
         names
     }
 
-    fn reconsider(
+    fn reassociate(
         &self,
-        image: &Image<'_>,
+        image: &FrameDetections<'_>,
         names: &[Option<ObjectId>],
-        map: &dyn Map,
+        map: &dyn MapEstimate,
     ) -> Vec<Option<ObjectId>> {
-        let again = self.put(image, map);
+        let again = self.assign_known(image, map);
         let is_free = |before: &ObjectId| !again.contains(&Some(*before));
         let keep = |(now, before): (&Option<ObjectId>, &Option<ObjectId>)| now.or(before.filter(is_free));
         again.iter().zip(names).map(keep).collect()
     }
 
-    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {
-        let Some(pose) = map.pose(image.frame) else { return Learned::default() };
-        self.began.get_or_insert(image.timestamp - AT_LARGE);
+    fn learn_from_frame(
+        &mut self,
+        image: &FrameDetections<'_>,
+        names: &[Option<ObjectId>],
+        map: &dyn MapEstimate,
+    ) -> Corrections {
+        let Some(pose) = map.pose(image.frame) else { return Corrections::default() };
+        self.start_time.get_or_insert(image.timestamp - PRIOR_OBJECT_AGE_S);
         let usual = self.usual_depth(&pose);
         let mut seen = vec![];
         for (place, (detection, id)) in image.detections.iter().zip(names).enumerate() {
             let Some(id) = *id else { continue };
             self.next = self.next.max(id.0.saturating_add(1));
             let detection = Detection { frame: image.frame, object: Some(id), ..detection.clone() };
-            let one = Seen { timestamp: image.timestamp, place, detection };
-            let Some(t) = self.track(id, &one.from(pose), usual) else { continue };
-            self.tracks[t].vote(&one.detection.scores, &self.aliases, 1.0);
+            let one = TrackBox { timestamp: image.timestamp, index: place, detection };
+            let Some(t) = self.find_or_create_track(id, &one.from(pose), usual) else { continue };
+            self.tracks[t].add_class_vote(&one.detection.scores, &self.aliases, 1.0);
             seen.push((t, one));
         }
         // keep the twin that fits best
         seen.sort_by(|(a, x), (b, y)| {
-            let fits = |t: usize, seen: &Seen| self.tracks[t].overlap(&seen.from(pose), &self.camera);
+            let fits = |t: usize, seen: &TrackBox| self.tracks[t].overlap(&seen.from(pose), &self.camera);
             a.cmp(b).then_with(|| fits(*b, y).total_cmp(&fits(*a, x)))
         });
         seen.dedup_by_key(|(t, _)| *t);
         let noise = self.settings.noise();
         for (t, one) in seen {
-            self.tracks[t].see(one, pose, map, &self.camera, &noise);
+            self.tracks[t].add_box(one, pose, map, &self.camera, &noise);
         }
-        let forgotten = self.forget(image.timestamp);
-        self.past.push_back(Past::new(image, names));
-        let moved = self.look_again(image.timestamp, map);
-        Learned { moved, merged: self.merge(image.frame), forgotten }
+        let forgotten = self.forget_tentative_tracks(image.timestamp);
+        self.pending_frames.push_back(PendingFrame::new(image, names));
+        let moved = self.reassociate_old_frames(image.timestamp, map);
+        Corrections { moved, merged: self.merge_objects(image.frame), forgotten }
     }
 
-    fn settle(&mut self, map: &dyn Map) -> Learned {
-        let moved = self.look_again(f64::INFINITY, map);
-        Learned { moved, merged: self.merge_all(), forgotten: vec![] }
+    fn finish_association(&mut self, map: &dyn MapEstimate) -> Corrections {
+        let moved = self.reassociate_old_frames(f64::INFINITY, map);
+        Corrections { moved, merged: self.merge_all_objects(), forgotten: vec![] }
     }
 }
 
 impl Tracker {
     /// Creates a tracker with the objects of the prior map.
     pub(super) fn new(
-        settings: Likelihood,
+        settings: LikelihoodAssociation,
         camera: Camera,
-        aliases: Aliases,
+        aliases: ClassAliases,
         known: &[Arc<PriorObject>],
     ) -> Self {
-        let mut tracks: Vec<Track> = known.iter().map(|object| Track::known(object)).collect();
+        let mut tracks: Vec<Track> = known.iter().map(|object| Track::of_prior_object(object)).collect();
         tracks.sort_by_key(|track| track.id);
         let next = tracks.iter().map(|track| track.id.0.saturating_add(1)).max().unwrap_or(1);
-        Self { settings, camera, aliases, tracks, next, began: None, past: VecDeque::new() }
+        Self { settings, camera, aliases, tracks, next, start_time: None, pending_frames: VecDeque::new() }
     }
 
     /// Returns the number of objects of the prior map.
-    pub(super) fn known(&self) -> usize {
+    pub(super) fn prior_object_count(&self) -> usize {
         self.tracks.partition_point(Track::is_known)
     }
 
     /// Returns the index of an object.
-    pub(super) fn place(&self, id: ObjectId) -> Option<usize> {
+    pub(super) fn track_index(&self, id: ObjectId) -> Option<usize> {
         // binary search, because a prior map may be large
-        let (known, own) = self.tracks.split_at(self.known());
+        let (known, own) = self.tracks.split_at(self.prior_object_count());
         let of_map = known.binary_search_by_key(&id, |track| track.id).ok();
         of_map.or_else(|| Some(known.len() + own.iter().position(|track| track.id == id)?))
     }
 
     /// Assigns known objects to the boxes of a frame.
-    fn put(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>> {
+    fn assign_known(&self, image: &FrameDetections<'_>, map: &dyn MapEstimate) -> Vec<Option<ObjectId>> {
         let mut names = vec![None; image.detections.len()];
         let Some(pose) = map.pose(image.frame) else { return names };
         let looked_at = best_scores(image.detections);
@@ -143,7 +148,7 @@ impl Tracker {
         }
         for i in looked_at {
             if names[i].is_none() {
-                names[i] = self.twin(image.detections, &names, i);
+                names[i] = self.twin_object(image.detections, &names, i);
             }
         }
         names
@@ -153,18 +158,19 @@ impl Tracker {
     /// columns.
     pub(super) fn gains(
         &self,
-        image: &Image<'_>,
+        image: &FrameDetections<'_>,
         boxes: &[usize],
         pose: &Se3,
     ) -> (Vec<(usize, usize, f64)>, Vec<usize>) {
         let usual = self.usual_depth(pose);
-        let classes: Vec<Option<String>> = boxes.iter().map(|i| self.class(&image.detections[*i])).collect();
-        let began = self.began.unwrap_or(image.timestamp - AT_LARGE);
+        let classes: Vec<Option<String>> =
+            boxes.iter().map(|i| self.best_class(&image.detections[*i])).collect();
+        let began = self.start_time.unwrap_or(image.timestamp - PRIOR_OBJECT_AGE_S);
         let (mut gains, mut tracks) = (vec![], vec![]);
         for (t, track) in self.tracks.iter().enumerate() {
-            let since = track.seen_at.unwrap_or(began);
+            let since = track.last_seen_s.unwrap_or(began);
             let unseen = (image.timestamp - since).max(0.0);
-            let Some(expected) = track.expected(unseen, pose, &self.camera, &self.settings) else {
+            let Some(expected) = track.expected_box(unseen, pose, &self.camera, &self.settings) else {
                 continue;
             };
             let before = gains.len();
@@ -188,17 +194,22 @@ impl Tracker {
     }
 
     /// Returns the class of a box.
-    pub(super) fn class(&self, detection: &Detection) -> Option<String> {
+    pub(super) fn best_class(&self, detection: &Detection) -> Option<String> {
         detection.scores.best().map(|(class, _)| self.aliases.canonical(class))
     }
 
     /// Returns the likelihood that a box of an object has a class.
     pub(super) fn class_likelihood(&self, track: &Track, class: Option<&str>) -> f64 {
-        self.settings.likelihood(class.map_or(1.0, |class| track.share(class)))
+        self.settings.class_likelihood(class.map_or(1.0, |class| track.class_share(class)))
     }
 
     /// Returns the object of the most similar box with an object, if the overlap is large enough.
-    fn twin(&self, detections: &[Detection], names: &[Option<ObjectId>], i: usize) -> Option<ObjectId> {
+    fn twin_object(
+        &self,
+        detections: &[Detection],
+        names: &[Option<ObjectId>],
+        i: usize,
+    ) -> Option<ObjectId> {
         let own = &detections[i].bounding_box;
         let named = detections
             .iter()
@@ -209,11 +220,11 @@ impl Tracker {
     }
 
     /// Returns the index of an object, and creates it from this sighting if it is new.
-    fn track(&mut self, id: ObjectId, first: &Sighting, depth: f64) -> Option<usize> {
-        self.place(id).or_else(|| {
+    fn find_or_create_track(&mut self, id: ObjectId, first: &Sighting, depth: f64) -> Option<usize> {
+        self.track_index(id).or_else(|| {
             // the sighting carries the uncertainty of a measured depth
             let depth = first.quantities.depth().unwrap_or(depth);
-            let belief = Belief::new(first, &self.camera, depth, *self.settings.depth_spread);
+            let belief = ObjectPrior::new(first, &self.camera, depth, *self.settings.depth_spread);
             self.tracks.push(Track::new(id, belief, first, &self.camera, &self.settings.noise())?);
             Some(self.tracks.len() - 1)
         })
@@ -222,21 +233,25 @@ impl Tracker {
     /// Returns the median distance of the objects whose place is known; the setting `depth` while there are
     /// too few.
     fn usual_depth(&self, pose: &Se3) -> f64 {
-        let known = self.tracks.iter().filter(|track| track.place_spread() < KNOWN);
+        let known = self.tracks.iter().filter(|track| track.relative_centre_sigma() < KNOWN_RELATIVE_SIGMA);
         let mut depths: Vec<f64> = known.map(|track| track.distance(pose)).collect();
         depths.sort_by(f64::total_cmp);
-        if depths.len() < FIRM { *self.settings.depth } else { depths[depths.len() / 2] }
+        if depths.len() < CONFIRMED_TRACK_BOXES { *self.settings.depth } else { depths[depths.len() / 2] }
     }
 
     /// Forgets objects with too few boxes that were not seen for a while, and the longest unseen if there are
     /// too many.
-    fn forget(&mut self, now: f64) -> Vec<ObjectId> {
-        let is_firm = |track: &Track| track.boxes.len() >= FIRM || track.is_known();
+    fn forget_tentative_tracks(&mut self, now: f64) -> Vec<ObjectId> {
+        let is_firm = |track: &Track| track.boxes.len() >= CONFIRMED_TRACK_BOXES || track.is_known();
         let doubtful = self.tracks.iter().filter(|track| !is_firm(track));
-        let mut seen: Vec<f64> = doubtful.filter_map(|track| track.seen_at).collect();
+        let mut seen: Vec<f64> = doubtful.filter_map(|track| track.last_seen_s).collect();
         seen.sort_by(|a, b| b.total_cmp(a));
-        let since = seen.get(WAITING).copied().unwrap_or(f64::NEG_INFINITY).max(now - PATIENCE);
-        let stays = |track: &mut Track| is_firm(track) || track.seen_at.is_some_and(|at| at > since);
+        let since = seen
+            .get(MAX_TENTATIVE_TRACKS)
+            .copied()
+            .unwrap_or(f64::NEG_INFINITY)
+            .max(now - TENTATIVE_TIMEOUT_S);
+        let stays = |track: &mut Track| is_firm(track) || track.last_seen_s.is_some_and(|at| at > since);
         self.tracks.extract_if(.., |track| !stays(track)).map(|track| track.id).collect()
     }
 }
@@ -245,10 +260,10 @@ impl Tracker {
 pub(super) fn best_scores(detections: &[Detection]) -> Vec<usize> {
     let mut all: Vec<usize> =
         (0..detections.len()).filter(|i| detections[*i].bounding_box.has_area()).collect();
-    if all.len() > BOXES {
+    if all.len() > MAX_BOXES_PER_FRAME {
         let score = |i: &usize| detections[*i].scores.best().map_or(0.0, |(_, score)| score);
         all.sort_by(|a, b| score(b).total_cmp(&score(a)));
-        all.truncate(BOXES);
+        all.truncate(MAX_BOXES_PER_FRAME);
         all.sort_unstable();
     }
     all

@@ -1,6 +1,6 @@
 //! Axes of an experiment.
 use manifactor_config::{Errors, Fault, Field, Node, Place, Placed, Table, Value, deserialize_with};
-use manifactor_mapping::settings::run_document::Declared;
+use manifactor_mapping::settings::run_document::DeclaredVariant;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
     pub(super) columns: Vec<Column>,
-    pub(super) options: Vec<Choice>,
+    pub(super) options: Vec<AxisChoice>,
 }
 
 /// A column of the table, and the position of its name in the document.
@@ -21,7 +21,7 @@ pub(super) struct Column {
 
 /// One choice of values for the columns of an axis.
 #[derive(Debug, Clone)]
-pub(super) struct Choice {
+pub(super) struct AxisChoice {
     /// Labels in tables, by column.
     pub(super) labels: Vec<String>,
     pub(super) place: Place,
@@ -33,14 +33,15 @@ pub(super) struct Choice {
 #[derive(JsonSchema)]
 #[serde(untagged)]
 pub(super) enum AxisDocument {
-    Rows(Rows),
-    Options(Options),
+    Rows(AxisRows),
+    Options(AxisOptions),
 }
 
 /// Columns that change together.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Rows {
+#[schemars(rename = "Rows")]
+pub(super) struct AxisRows {
     /// Columns, each with the setting that it changes: { seed = "source.seed" }.
     #[schemars(with = "BTreeMap<String, String>")]
     columns: Node,
@@ -52,13 +53,14 @@ pub(super) struct Rows {
 /// One column of options.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Options {
+#[schemars(rename = "Options")]
+pub(super) struct AxisOptions {
     /// Name of the column.
     #[schemars(with = "String")]
     name: Placed<String>,
     /// Options of the column.
-    #[schemars(with = "Vec<Declared>")]
-    options: Placed<Vec<Declared>>,
+    #[schemars(with = "Vec<DeclaredVariant>")]
+    options: Placed<Vec<DeclaredVariant>>,
 }
 
 impl<'de> Deserialize<'de> for AxisDocument {
@@ -77,7 +79,7 @@ impl Axis {
     pub(super) fn read(document: AxisDocument, errors: &Errors) -> Option<Self> {
         let (place, axis) = match document {
             AxisDocument::Rows(rows) => (rows.rows.place.clone(), Self::of_rows(rows, errors)?),
-            AxisDocument::Options(Options { name: Placed { place, value: name }, options }) => {
+            AxisDocument::Options(AxisOptions { name: Placed { place, value: name }, options }) => {
                 (options.place, Self::of_options(Column { name, place }, options.value))
             }
         };
@@ -88,8 +90,8 @@ impl Axis {
     }
 
     /// Creates an axis with one column and a name for each option.
-    pub(super) fn of_options(column: Column, options: Vec<Declared>) -> Self {
-        let choice = |Declared { name: Placed { place, value: name }, set, .. }| Choice {
+    pub(super) fn of_options(column: Column, options: Vec<DeclaredVariant>) -> Self {
+        let choice = |DeclaredVariant { name: Placed { place, value: name }, set, .. }| AxisChoice {
             labels: vec![name],
             sets: vec![set.unwrap_or_else(|| Node::new(place.clone(), Value::Table(Table::default())))],
             place,
@@ -97,7 +99,7 @@ impl Axis {
         Self { columns: vec![column], options: options.into_iter().map(choice).collect() }
     }
 
-    fn of_rows(Rows { columns, rows }: Rows, errors: &Errors) -> Option<Self> {
+    fn of_rows(AxisRows { columns, rows }: AxisRows, errors: &Errors) -> Option<Self> {
         let Value::Table(columns) = columns.value else {
             let problem = Fault::wrong_type("a table of columns and what they set", columns.in_words());
             errors.report(columns.place, problem);
@@ -109,14 +111,14 @@ impl Axis {
             .unzip();
         let paths: Vec<Option<String>> = keys.into_iter().map(|key| key.read(errors)).collect();
         let paths: Vec<String> = paths.into_iter().collect::<Option<_>>()?;
-        let options: Vec<Option<Choice>> =
-            rows.value.into_iter().map(|row| choice(row, &paths, errors)).collect();
+        let options: Vec<Option<AxisChoice>> =
+            rows.value.into_iter().map(|row| read_choice(row, &paths, errors)).collect();
         Some(Self { columns, options: options.into_iter().collect::<Option<_>>()? })
     }
 }
 
 /// Reads a row: a value for each column, or the value itself if there is only one column.
-fn choice(row: Node, paths: &[String], errors: &Errors) -> Option<Choice> {
+fn read_choice(row: Node, paths: &[String], errors: &Errors) -> Option<AxisChoice> {
     let place = row.place.clone();
     let values = match row.value {
         Value::Array(items) if paths.len() > 1 => items,
@@ -130,7 +132,7 @@ fn choice(row: Node, paths: &[String], errors: &Errors) -> Option<Choice> {
     }
     let labels = values.iter().map(label).collect();
     let sets = paths.iter().zip(values).map(|(path, value)| nested(path, value)).collect();
-    Some(Choice { labels, place, sets })
+    Some(AxisChoice { labels, place, sets })
 }
 
 /// Returns nested tables for a path `a.b.c` and a value.

@@ -1,5 +1,5 @@
 //! Checks for mistakes in axes that would make an experiment misleading.
-use super::axis::{Axis, Choice, Column};
+use super::axis::{Axis, AxisChoice, Column};
 use crate::measures::measure_names;
 use indexmap::IndexMap;
 use manifactor_config::{Diagnostic, Errors, Fault, Node, Place, Value};
@@ -7,7 +7,7 @@ use manifactor_metrics::Alignment;
 use std::collections::{HashMap, HashSet};
 
 /// Columns of the tables besides axes and measures.
-const OWN: [&str; 15] = [
+const RESERVED_COLUMNS: [&str; 15] = [
     "status",
     "reason",
     "seconds",
@@ -27,17 +27,17 @@ const OWN: [&str; 15] = [
 
 /// Checks that each column has a unique name, that the choices of an axis differ, and that only one column
 /// varies a setting.
-pub(super) fn axes(axes: &[Axis], errors: &Errors) {
-    columns(axes, errors);
-    axes.iter().for_each(|axis| repeated(axis, errors));
-    overlapping(axes, errors);
+pub(super) fn check_axes(axes: &[Axis], errors: &Errors) {
+    check_columns(axes, errors);
+    axes.iter().for_each(|axis| report_repeated_choices(axis, errors));
+    report_overlapping_columns(axes, errors);
 }
 
-fn columns(axes: &[Axis], errors: &Errors) {
+fn check_columns(axes: &[Axis], errors: &Errors) {
     let measures = measure_names(&Alignment::ALL);
     let mut first: HashMap<&str, &Place> = HashMap::new();
     for Column { name, place } in axes.iter().flat_map(|axis| &axis.columns) {
-        if OWN.contains(&name.as_str()) || measures.contains(name) {
+        if RESERVED_COLUMNS.contains(&name.as_str()) || measures.contains(name) {
             let message = format!("the tables have a column `{name}` of their own");
             errors.report(place.clone(), Fault::with_help(message, "give this one another name"));
         }
@@ -48,12 +48,12 @@ fn columns(axes: &[Axis], errors: &Errors) {
 }
 
 /// Reports equal choices: their trials are one trial, but would be counted twice.
-fn repeated(axis: &Axis, errors: &Errors) {
+fn report_repeated_choices(axis: &Axis, errors: &Errors) {
     let (mut values, mut labels) = (HashMap::new(), HashMap::new());
     for choice in &axis.options {
         let value: String = choice.sets.iter().map(canonical).collect();
         if let Some(first) = values.insert(value, choice) {
-            let words = |choice: &Choice| choice.labels.join(", ");
+            let words = |choice: &AxisChoice| choice.labels.join(", ");
             let message = format!("`{}` sets the same as `{}`", words(choice), words(first));
             let help = "leave one of them out: their trials would be the same, and not independent";
             let related = Some((first.place.clone(), "first given here".to_owned()));
@@ -69,12 +69,14 @@ fn repeated(axis: &Axis, errors: &Errors) {
 /// Returns equal text for equal values: `1`, `0x1` and `1.0`.
 fn canonical(node: &Node) -> String {
     // below this limit every whole f64 is an i64
-    const WHOLE: f64 = 9e18;
+    const MAX_EXACT_INTEGER: f64 = 9e18;
     match &node.value {
         Value::Null => "null".to_owned(),
         Value::Bool(value) => value.to_string(),
         Value::Integer(value) => value.to_string(),
-        Value::Float(value) if value.fract() == 0.0 && value.abs() < WHOLE => (*value as i64).to_string(),
+        Value::Float(value) if value.fract() == 0.0 && value.abs() < MAX_EXACT_INTEGER => {
+            (*value as i64).to_string()
+        }
         Value::Float(value) => value.to_string(),
         Value::String(value) => format!("{value:?}"),
         Value::Array(items) => {
@@ -90,25 +92,26 @@ fn canonical(node: &Node) -> String {
 }
 
 /// A column, by its axis and its index in the axis. A later column replaces settings of an earlier one.
-type Owner = (usize, usize);
+type ColumnIndex = (usize, usize);
 
 /// Reports two columns that set one key, because the first has no effect.
-fn overlapping(axes: &[Axis], errors: &Errors) {
-    let mut keys: IndexMap<(Vec<&str>, Owner), &Place> = IndexMap::new();
+fn report_overlapping_columns(axes: &[Axis], errors: &Errors) {
+    let mut keys: IndexMap<(Vec<&str>, ColumnIndex), &Place> = IndexMap::new();
     for (i, axis) in axes.iter().enumerate() {
         for choice in &axis.options {
             for (j, set) in choice.sets.iter().enumerate() {
-                leaves(set, &mut vec![], &mut |path, place| {
+                visit_leaves(set, &mut vec![], &mut |path, place| {
                     keys.entry((path.to_vec(), (i, j))).or_insert(place);
                 });
             }
         }
     }
     keys.sort_unstable_keys();
-    let name =
-        |(i, j): Owner| axes.get(i).and_then(|axis| axis.columns.get(j)).map_or("", |column| &column.name);
-    let mut told: HashSet<[Owner; 2]> = HashSet::new();
-    let mut above: Option<(&[&str], Owner, &Place)> = None;
+    let name = |(i, j): ColumnIndex| {
+        axes.get(i).and_then(|axis| axis.columns.get(j)).map_or("", |column| &column.name)
+    };
+    let mut told: HashSet<[ColumnIndex; 2]> = HashSet::new();
+    let mut above: Option<(&[&str], ColumnIndex, &Place)> = None;
     for ((path, owner), place) in &keys {
         // keys are sorted: a key is followed by the keys within it
         match above.filter(|(outer, ..)| path.starts_with(outer)) {
@@ -133,11 +136,11 @@ fn overlapping(axes: &[Axis], errors: &Errors) {
 }
 
 /// Visits the paths of all values that are not tables.
-fn leaves<'a>(node: &'a Node, path: &mut Vec<&'a str>, visit: &mut impl FnMut(&[&'a str], &'a Place)) {
+fn visit_leaves<'a>(node: &'a Node, path: &mut Vec<&'a str>, visit: &mut impl FnMut(&[&'a str], &'a Place)) {
     let Value::Table(table) = &node.value else { return visit(path, &node.place) };
     for (key, field) in table.iter() {
         path.push(key);
-        leaves(&field.node, path, visit);
+        visit_leaves(&field.node, path, visit);
         path.pop();
     }
 }
@@ -154,7 +157,7 @@ mod tests {
         let read = document.section(&errors).map(|mut section| {
             let read = |axis: &Node| Axis::read(axis.read(&errors)?, &errors);
             let all: Vec<Axis> = section.nodes("axes").iter().filter_map(read).collect();
-            axes(&all, &errors);
+            check_axes(&all, &errors);
             section.finish();
         });
         errors.finish(read).map_or_else(|e| e.to_string(), |()| String::new())

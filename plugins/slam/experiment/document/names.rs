@@ -9,7 +9,7 @@ use manifactor_run::output::report::alignment_name;
 use std::collections::HashSet;
 
 /// Names in a `[summary]`.
-pub(super) struct Names<'a> {
+pub(super) struct SummaryNameCheck<'a> {
     pub(super) settings: &'a SummarySettings,
     /// The table, if there is one.
     pub(super) written: Option<&'a Node>,
@@ -18,20 +18,20 @@ pub(super) struct Names<'a> {
     pub(super) errors: &'a Errors,
 }
 
-impl Names<'_> {
+impl SummaryNameCheck<'_> {
     /// Checks that all columns, values and metrics exist, and that none is listed twice.
     pub(super) fn check(&self, axes: &[Axis]) {
-        self.columns(axes);
-        self.metrics();
-        self.compared(axes);
+        self.check_columns(axes);
+        self.check_metrics();
+        self.check_compared(axes);
         let SummarySettings { by, clusters, metrics, .. } = self.settings;
-        self.across();
-        self.twice("by", "column", by);
-        self.twice("clusters", "column", clusters);
-        self.twice("metrics", "metric", metrics);
+        self.check_across();
+        self.check_duplicates("by", "column", by);
+        self.check_duplicates("clusters", "column", clusters);
+        self.check_duplicates("metrics", "metric", metrics);
     }
 
-    fn columns(&self, axes: &[Axis]) {
+    fn check_columns(&self, axes: &[Axis]) {
         let SummarySettings { by, baseline, clusters, across, curve, .. } = self.settings;
         let columns: Vec<String> =
             axes.iter().flat_map(|axis| &axis.columns).map(|column| column.name.clone()).collect();
@@ -40,11 +40,11 @@ impl Names<'_> {
         let all = all.chain(clusters.iter().map(named("clusters"))).chain(curve.iter().map(named("curve")));
         let all = all.chain(across.iter().map(named("across")));
         for (field, name) in all.filter(|(_, name)| !columns.contains(name)) {
-            self.unknown(field, "column", name, &columns);
+            self.report_unknown(field, "column", name, &columns);
         }
     }
 
-    fn metrics(&self) {
+    fn check_metrics(&self) {
         let known = measure_names(&Alignment::ALL);
         for name in self.settings.metrics.iter().filter(|name| !known.contains(name)) {
             let meant = nearest(name, known.iter().map(String::as_str));
@@ -55,7 +55,7 @@ impl Names<'_> {
         }
     }
 
-    fn compared(&self, axes: &[Axis]) {
+    fn check_compared(&self, axes: &[Axis]) {
         if let Some((column, value)) = self.settings.compared() {
             let labels = axes.iter().filter_map(|axis| {
                 let place = axis.columns.iter().position(|c| c.name == column)?;
@@ -63,7 +63,7 @@ impl Names<'_> {
             });
             let labels: Vec<String> = labels.flatten().collect();
             if !labels.is_empty() && !labels.iter().any(|label| label == value) {
-                self.unknown("baseline", column, value, &labels);
+                self.report_unknown("baseline", column, value, &labels);
             }
         }
         if self.settings.baseline.len() > 1 {
@@ -72,7 +72,7 @@ impl Names<'_> {
         }
     }
 
-    fn across(&self) {
+    fn check_across(&self) {
         let Some(across) = &self.settings.across else { return };
         let compared = self.settings.compared().map(|(column, _)| column);
         if !self.settings.by.contains(across) && compared != Some(across) {
@@ -82,7 +82,7 @@ impl Names<'_> {
         }
     }
 
-    fn twice(&self, field: &str, what: &str, names: &[String]) {
+    fn check_duplicates(&self, field: &str, what: &str, names: &[String]) {
         let mut met = HashSet::new();
         for name in names.iter().filter(|name| !met.insert(*name)) {
             let problem = Fault::Duplicate { what: what.to_owned(), name: name.clone() };
@@ -108,7 +108,7 @@ impl Names<'_> {
         }
     }
 
-    fn unknown(&self, field: &str, what: &str, name: &str, known: &[String]) {
+    fn report_unknown(&self, field: &str, what: &str, name: &str, known: &[String]) {
         let (what, name, known) = (what.to_owned(), name.to_owned(), known.to_vec());
         self.errors.report(self.place_of(field, &name), Fault::UnknownName { what, name, known });
     }
@@ -150,7 +150,7 @@ mod tests {
         let written = document.root().field("summary").unwrap();
         let settings: SummarySettings = written.read(&errors).unwrap();
         let place = written.place.clone();
-        Names { settings: &settings, written: Some(written), place, errors: &errors }.check(&axes);
+        SummaryNameCheck { settings: &settings, written: Some(written), place, errors: &errors }.check(&axes);
         errors.finish(Some(())).map_or_else(|e| e.to_string(), |()| String::new())
     }
 

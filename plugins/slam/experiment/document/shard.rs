@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// Returns the folder of all shards of an experiment: `out/sweep.shards`.
-fn beside(output: &Path) -> PathBuf {
+fn shards_folder(output: &Path) -> PathBuf {
     let name = output.file_name().unwrap_or(OsStr::new("experiment"));
     output.with_file_name([name, OsStr::new(".shards")].join(OsStr::new("")))
 }
@@ -26,31 +26,31 @@ pub struct Shard {
 /// Error for a text that is not a shard.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected K/N, the K-th of N parts, such as 2/8; got `{0}`")]
-pub struct NoShard(String);
+pub struct ShardError(String);
 
 impl FromStr for Shard {
-    type Err = NoShard;
-    fn from_str(text: &str) -> Result<Self, NoShard> {
+    type Err = ShardError;
+    fn from_str(text: &str) -> Result<Self, ShardError> {
         let parts = text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
         match parts {
             Some((number, of)) if 1 <= number && number <= of => Ok(Self { number, of }),
-            _ => Err(NoShard(text.to_owned())),
+            _ => Err(ShardError(text.to_owned())),
         }
     }
 }
 
 impl Experiment {
     /// Keeps one part of the trials. Its results go to a separate folder.
-    pub fn keep(&mut self, Shard { number, of }: Shard) {
+    pub fn restrict_to_shard(&mut self, Shard { number, of }: Shard) {
         let mut place = 0..;
         self.trials.retain(|_| place.next().is_some_and(|i| i % of == number - 1));
-        self.output = beside(&self.output).join(format!("{number}-of-{of}"));
+        self.output = shards_folder(&self.output).join(format!("{number}-of-{of}"));
     }
 }
 
 /// Returns the folders of an experiment's shards, sorted by name.
-pub(crate) fn folders(output: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(beside(output)).into_iter().flatten();
+pub(crate) fn shard_folders(output: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(shards_folder(output)).into_iter().flatten();
     let mut folders: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
     folders.sort();
     folders

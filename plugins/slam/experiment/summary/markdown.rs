@@ -1,8 +1,8 @@
 //! Table of an experiment as Markdown, for `summary.md`.
-use super::{Group, Summary};
+use super::{ExperimentSummary, TrialGroup};
 use indexmap::{IndexMap, IndexSet};
 
-impl Summary {
+impl ExperimentSummary {
     /// Returns a table of means for people. A compared mean is followed by its difference from the baseline.
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
@@ -51,7 +51,8 @@ impl Summary {
     /// trials that failed or did not converge follows the mean of their group.
     fn side_by_side(&self, column: &str) -> (Vec<String>, Vec<Vec<String>>) {
         let place = self.columns.iter().position(|name| name == column);
-        let (mut values, mut rows): (IndexSet<&str>, IndexMap<Vec<&str>, Vec<&Group>>) = Default::default();
+        let (mut values, mut rows): (IndexSet<&str>, IndexMap<Vec<&str>, Vec<&TrialGroup>>) =
+            Default::default();
         for group in &self.groups {
             let (own, others): (Vec<_>, Vec<_>) =
                 group.labels.iter().enumerate().partition(|(i, _)| Some(*i) == place);
@@ -67,10 +68,11 @@ impl Summary {
             || self.metrics.iter().flat_map(|metric| values.iter().map(move |value| (metric, *value)));
         let labels = self.columns.iter().filter(|name| *name != column).cloned();
         let header = labels.chain(cells().map(|(metric, value)| of(metric, value))).collect();
-        let row = |(labels, groups): (&Vec<&str>, &Vec<&Group>)| {
+        let row = |(labels, groups): (&Vec<&str>, &Vec<&TrialGroup>)| {
             let cell = |(metric, value): (&String, &str)| {
-                let has =
-                    |group: &&&Group| place.and_then(|i| group.labels.get(i)).is_some_and(|l| l == value);
+                let has = |group: &&&TrialGroup| {
+                    place.and_then(|i| group.labels.get(i)).is_some_and(|l| l == value)
+                };
                 groups.iter().find(has).map_or("-".to_owned(), |group| {
                     let mark = |count: usize, what: &str| match count {
                         0 => String::new(),
@@ -87,7 +89,7 @@ impl Summary {
     }
 }
 
-impl Group {
+impl TrialGroup {
     /// Returns a mean, followed by its difference from the baseline.
     fn cell(&self, metric: &str) -> String {
         let mean = self.means.get(metric).map_or("-".to_owned(), |mean| rounded(mean.mean));
@@ -116,7 +118,7 @@ mod tests {
 
     #[test]
     fn one_column_stands_side_by_side_and_what_did_not_converge_is_marked() {
-        let group = |input: &str, variant: &str, mean: f64, not_converged: usize| Group {
+        let group = |input: &str, variant: &str, mean: f64, not_converged: usize| TrialGroup {
             labels: vec![input.into(), variant.into()],
             trials: 1,
             failed: 0,
@@ -124,7 +126,7 @@ mod tests {
             means: [("gain".to_owned(), Interval { mean, low: None, high: None })].into(),
             comparisons: IndexMap::new(),
         };
-        let summary = Summary {
+        let summary = ExperimentSummary {
             title: "t".into(),
             columns: vec!["input".into(), "variant".into()],
             metrics: vec!["gain".into()],

@@ -21,7 +21,7 @@ pub fn trials_table(experiment: &Experiment, journal: &TrialLog) -> Table {
     columns.push(("status".to_owned(), text(TrialOutcome::status)));
     columns.push(("reason".to_owned(), text(TrialOutcome::reason)));
     for measure in measures {
-        let cells = records.iter().map(|record| record.outcome.measure(measure)).collect();
+        let cells = records.iter().map(|record| record.outcome.measure_by_name(measure)).collect();
         columns.push((measure.to_owned(), Column::Number(cells)));
     }
     Table { columns }
@@ -41,7 +41,7 @@ pub(super) fn records<'a>(
     experiment: &'a Experiment,
     journal: &'a TrialLog,
 ) -> impl Iterator<Item = &'a TrialRecord> {
-    experiment.trials.iter().filter_map(|trial| journal.find(trial))
+    experiment.trials.iter().filter_map(|trial| journal.record_of(trial))
 }
 
 fn labels(experiment: &Experiment, records: &[&TrialRecord]) -> Vec<(String, Column)> {
@@ -78,7 +78,7 @@ impl TrialOutcome {
     }
 
     /// Returns one measure; `None` if it is unknown.
-    pub fn measure(&self, name: &str) -> Option<f64> {
+    pub fn measure_by_name(&self, name: &str) -> Option<f64> {
         match self {
             Self::Solved { measures, .. } => measures.get(name).copied(),
             Self::Failed { .. } => None,

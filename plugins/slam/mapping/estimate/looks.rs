@@ -1,34 +1,34 @@
 //! Opportunities to detect each object, and the detections among them.
-use crate::estimate::{Estimate, Landmark};
-use crate::mapping::measurements::{Measured, ObjectBox};
+use crate::estimate::{Estimate, LandmarkEstimate};
+use crate::mapping::measurements::{ObjectBox, ObjectMeasurements};
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
-use manifactor_recording::prior_map::Looks;
+use manifactor_recording::prior_map::LookCounts;
 use manifactor_recording::sequence::ObjectId;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 /// Change of the viewing direction at which a new opportunity begins, in radians.
-const ANGLE: f64 = 0.1;
+const NEW_LOOK_RAD: f64 = 0.1;
 /// Time after which a new opportunity begins, in seconds: the detector errs differently by then.
-const SECONDS: f64 = 1.0;
+const NEW_LOOK_S: f64 = 1.0;
 /// An object is occluded if a nearer object covers more than this share of its outline.
-const HIDDEN: f64 = 0.2;
+const MAX_OCCLUDED_SHARE: f64 = 0.2;
 /// An object is too far away to be detected if its outline is smaller than this share of its smallest box so
 /// far. Both sizes are square roots of areas.
-const FAR: f64 = 0.5;
+const MIN_SIZE_SHARE: f64 = 0.5;
 
 /// An object should be detected again from viewing directions within this angle of an earlier detection, in
 /// radians.
-const NEAR: f64 = 0.26;
+const SAME_DIRECTION_RAD: f64 = 0.26;
 
 /// Opportunities to detect an object.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Looked {
+pub struct ObjectLooks {
     /// All looks.
-    pub all: Looks,
+    pub all: LookCounts,
     /// Opportunities that began before the last detection.
-    pub before: Looks,
+    pub before: LookCounts,
     /// Later opportunities from a direction with an earlier detection. All later ones if the object has no
     /// detections.
     pub since: usize,
@@ -36,17 +36,17 @@ pub struct Looked {
 
 /// Opportunities so far. The last one continues.
 #[derive(Default)]
-struct Counted {
-    looked: Looked,
+struct LookCounter {
+    looked: ObjectLooks,
     seen_from: Vec<Vector3<f64>>,
     is_seen: bool,
 }
 
-impl Counted {
+impl LookCounter {
     /// Starts a new opportunity.
-    fn look(&mut self, views: &[ObjectBox], sight: &Sight) {
+    fn start_look(&mut self, views: &[ObjectBox], sight: &VisibleObject) {
         self.looked.all.expected += 1;
-        let is_near = || self.seen_from.iter().any(|seen| seen.angle(&sight.from) < NEAR);
+        let is_near = || self.seen_from.iter().any(|seen| seen.angle(&sight.from) < SAME_DIRECTION_RAD);
         match views.last() {
             Some(last) if sight.frame <= last.frame => self.looked.before.expected += 1,
             Some(_) => self.looked.since += usize::from(is_near()),
@@ -56,7 +56,7 @@ impl Counted {
     }
 
     /// Records a detection in the current opportunity.
-    fn see(&mut self, from: Vector3<f64>) {
+    fn record_detection(&mut self, from: Vector3<f64>) {
         if !self.is_seen {
             self.looked.all.seen += 1;
             self.looked.before.seen += 1;
@@ -67,24 +67,24 @@ impl Counted {
 }
 
 /// Returns the opportunities to detect each mapped object, from the estimated poses and objects.
-pub fn looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, Looked> {
+pub fn count_looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, ObjectLooks> {
     let measured = |id: ObjectId| estimate.mapping.measurements.object(id);
-    let expected = |landmark: &Landmark<'_>| {
+    let expected = |landmark: &LandmarkEstimate<'_>| {
         let id = landmark.object.id;
-        Expected::new(id, *landmark.quadric, measured(id).and_then(Measured::least_px))
+        ExpectedObject::new(id, *landmark.quadric, measured(id).and_then(ObjectMeasurements::least_px))
     };
-    let objects: Vec<Expected> = estimate.landmarks().iter().map(expected).collect();
+    let objects: Vec<ExpectedObject> = estimate.landmarks().iter().map(expected).collect();
     let trajectory = estimate.trajectory();
     let poses = trajectory.iter().enumerate().map(|(frame, at)| (frame, at.timestamp, at.pose));
-    let mut all: BTreeMap<ObjectId, Counted> = BTreeMap::new();
-    sights(&objects, poses, &estimate.sequence.camera, border, |sight| {
+    let mut all: BTreeMap<ObjectId, LookCounter> = BTreeMap::new();
+    visit_visible_objects(&objects, poses, &estimate.sequence.camera, border, |sight| {
         let counted = all.entry(sight.id).or_default();
         let views = measured(sight.id).map_or(&[][..], |measured| &measured.views);
         if sight.begins {
-            counted.look(views, &sight);
+            counted.start_look(views, &sight);
         }
         if views.binary_search_by_key(&sight.frame, |view| view.frame).is_ok() {
-            counted.see(sight.from);
+            counted.record_detection(sight.from);
         }
     });
     all.into_iter().map(|(id, counted)| (id, counted.looked)).collect()
@@ -92,7 +92,7 @@ pub fn looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, Looked> {
 
 /// A frame with a visible object.
 #[derive(Debug, Clone, Copy)]
-pub struct Sight {
+pub struct VisibleObject {
     /// The object.
     pub id: ObjectId,
     /// Number of the frame.
@@ -105,54 +105,59 @@ pub struct Sight {
     pub begins: bool,
 }
 
-/// Calls `tell` for each visible object of each frame (index, timestamp in seconds, pose). An object counts
+/// Calls `visit` for each visible object of each frame (index, timestamp in seconds, pose). An object counts
 /// as visible if its whole outline is at least `border` pixels inside the image, it is not much smaller than
 /// its smallest box, and no mapped object occludes it.
-pub fn sights(
-    objects: &[Expected],
+pub fn visit_visible_objects(
+    objects: &[ExpectedObject],
     frames: impl Iterator<Item = (usize, f64, Se3)>,
     camera: &Camera,
     border: f64,
-    mut tell: impl FnMut(Sight),
+    mut visit: impl FnMut(VisibleObject),
 ) {
     // start time and first direction of the current opportunity
     let mut looks: BTreeMap<ObjectId, (f64, Vector3<f64>)> = BTreeMap::new();
     for (frame, seconds, pose) in frames {
         for (id, from) in in_view(objects, &pose, camera, border) {
             let goes_on = |(began, first): &(f64, Vector3<f64>)| {
-                seconds - began < SECONDS && first.angle(&from) < ANGLE
+                seconds - began < NEW_LOOK_S && first.angle(&from) < NEW_LOOK_RAD
             };
             let begins = !looks.get(&id).is_some_and(goes_on);
             if begins {
                 looks.insert(id, (seconds, from));
             }
-            tell(Sight { id, frame, pose, from, begins });
+            visit(VisibleObject { id, frame, pose, from, begins });
         }
     }
 }
 
 /// An object that may be visible.
-pub struct Expected {
+pub struct ExpectedObject {
     id: ObjectId,
     quadric: DualQuadric,
     /// Smallest outline that counts as visible, in square pixels.
     area: f64,
 }
 
-impl Expected {
+impl ExpectedObject {
     /// Creates the entry of an object. `least_px` is the size of its smallest box: the square root of the
     /// area, in pixels.
     pub fn new(id: ObjectId, quadric: DualQuadric, least_px: Option<f64>) -> Self {
-        Self { id, quadric, area: (FAR * least_px.unwrap_or_default()).powi(2) }
+        Self { id, quadric, area: (MIN_SIZE_SHARE * least_px.unwrap_or_default()).powi(2) }
     }
 }
 
 /// Returns the objects that are visible from a pose, with the vectors from their centres to the camera.
-fn in_view(objects: &[Expected], pose: &Se3, camera: &Camera, border: f64) -> Vec<(ObjectId, Vector3<f64>)> {
+fn in_view(
+    objects: &[ExpectedObject],
+    pose: &Se3,
+    camera: &Camera,
+    border: f64,
+) -> Vec<(ObjectId, Vector3<f64>)> {
     let nothing = BoundingBox { xmin: 0.0, ymin: 0.0, xmax: 0.0, ymax: 0.0 };
     let factor = BoundingBoxFactor { bounding_box: nothing, camera: *camera, model: BoxModel::Standard };
-    let outline = |object: &'_ Expected| {
-        let Expected { id, quadric, area } = object;
+    let outline = |object: &'_ ExpectedObject| {
+        let ExpectedObject { id, quadric, area } = object;
         let outline = factor.predict(pose, quadric).filter(|_| quadric.is_in_front_of(pose))?;
         Some((*id, outline, pose.translation - quadric.centroid(), *area))
     };
@@ -161,7 +166,7 @@ fn in_view(objects: &[Expected], pose: &Se3, camera: &Camera, border: f64) -> Ve
         let nearer = outlines.iter().filter(|(_, _, other, _)| other.norm() < from.norm());
         let mut shares =
             nearer.filter_map(|(_, other, ..)| Some(own.intersection(other)?.area() / own.area()));
-        shares.any(|share| share > HIDDEN)
+        shares.any(|share| share > MAX_OCCLUDED_SHARE)
     };
     let is_whole =
         |outline: &BoundingBox| outline.sides_inside(camera.width, camera.height, border) == [true; 4];

@@ -10,7 +10,7 @@ use indexmap::IndexMap;
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::checked::{NotNegative, Positive};
 use manifactor_graph::{Direction, FactorEntry, Graph, Key, Values};
-use manifactor_quadric::{DualQuadric, SHORTEST};
+use manifactor_quadric::{DualQuadric, MIN_SEMI_AXIS};
 use manifactor_solve::{DiagonalLimits, LevenbergMarquardt, Optimizer, Problem, Silent, Stopping};
 use nalgebra::{Rotation3, Vector3};
 
@@ -44,7 +44,7 @@ impl<'a> Refiner<'a> {
     pub(crate) fn refine(&self, values: &mut Values) {
         for (key, entries) in &self.objects {
             if let Ok(start) = values.get::<DualQuadric>(key).copied() {
-                let better = refined(key, start, entries, values, self.up);
+                let better = refine_object(key, start, entries, values, self.up);
                 values.insert(key.clone(), better);
             }
         }
@@ -53,18 +53,18 @@ impl<'a> Refiner<'a> {
 
 /// Minimizes from several initial values, with other variables fixed at their values in `others`. Returns the
 /// result with the fewest undefined factors, then the lowest cost. Returns `start` if no result is better.
-pub fn refined(
+pub fn refine_object(
     key: &Key,
     start: DualQuadric,
     entries: &[&FactorEntry],
     others: &Values,
     up: Option<Direction>,
 ) -> DualQuadric {
-    let (graph, mut values) = alone(key, start, entries.iter().copied(), others);
+    let (graph, mut values) = object_graph(key, start, entries.iter().copied(), others);
     // the joint solve reports a graph that cannot be compiled
     let Ok(mut problem) = Problem::compile(&graph, &values) else { return start };
     let mut best = (rank(&problem), start);
-    for candidate in starts(&start, upright(up)) {
+    for candidate in initial_values(&start, upright_axes(up)) {
         values.insert(key.clone(), candidate);
         if problem.set_values(&values).is_err() {
             continue;
@@ -82,7 +82,7 @@ pub fn refined(
 
 /// Returns the graph of one object with its factors and its initial value. The further variables of these
 /// factors are fixed.
-pub(super) fn alone<'a>(
+pub(super) fn object_graph<'a>(
     key: &Key,
     start: DualQuadric,
     entries: impl Iterator<Item = &'a FactorEntry>,
@@ -104,10 +104,10 @@ pub(super) fn alone<'a>(
 
 /// Returns the initial values: the start itself, a ball, and an ellipsoid elongated along each of the given
 /// axes.
-fn starts(start: &DualQuadric, axes: So3) -> Vec<DualQuadric> {
+fn initial_values(start: &DualQuadric, axes: So3) -> Vec<DualQuadric> {
     let s = start.semi_axes;
     // the middle semi-axis is the one least likely to be far off
-    let radius = (s.sum() - s.min() - s.max()).max(SHORTEST);
+    let radius = (s.sum() - s.min() - s.max()).max(MIN_SEMI_AXIS);
     let pose = Se3::new(axes, start.centroid());
     let along_axes = |semi_axes| DualQuadric { pose, semi_axes };
     let mut starts = vec![*start, along_axes(Vector3::repeat(radius))];
@@ -120,7 +120,7 @@ fn starts(start: &DualQuadric, axes: So3) -> Vec<DualQuadric> {
 }
 
 /// Returns axes with one of them vertical.
-fn upright(up: Option<Direction>) -> So3 {
+fn upright_axes(up: Option<Direction>) -> So3 {
     let rotation = Rotation3::rotation_between(&Vector3::z(), &up.unwrap_or_default());
     // for exactly upside down the rotation is not unique, and upright axes are as good
     rotation.map_or_else(So3::identity, |rotation| So3::from_matrix(rotation.matrix()))
@@ -136,11 +136,11 @@ fn rank(problem: &Problem) -> (usize, f64) {
 }
 
 fn solver() -> LevenbergMarquardt {
-    roughly(30, NotNegative::literal(1e-5))
+    coarse_solver(30, NotNegative::literal(1e-5))
 }
 
 /// Returns a solver that stops when a step lowers the cost by less than this share.
-pub(super) fn roughly(max_iterations: usize, relative_cost: NotNegative) -> LevenbergMarquardt {
+pub(super) fn coarse_solver(max_iterations: usize, relative_cost: NotNegative) -> LevenbergMarquardt {
     let stop = Stopping { max_iterations, relative_cost, ..Stopping::default() };
     // equal damping for all directions: damping in proportion to the Hessian would let a semi-axis vanish,
     // because the derivatives of a very short one are almost zero

@@ -15,6 +15,6 @@ mod motion;
 
 pub use crate::settings::{BoxGroups, VarianceSettings};
 pub use boxes::BoxComponent;
-pub use components::{Components, VarianceError};
-pub use cross_validation::Score;
+pub use components::{VarianceComponents, VarianceError};
+pub use cross_validation::CrossValidationScore;
 pub use motion::{MotionChoice, MotionComponent};

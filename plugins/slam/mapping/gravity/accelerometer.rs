@@ -1,5 +1,5 @@
 use super::{Gravity, GravityError, MapFrame, first_frame};
-use manifactor_geometry::{NotARotation, So3};
+use manifactor_geometry::{RotationError, So3};
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Direction, register};
 use manifactor_recording::sequence::{Frame, Sequence};
@@ -18,7 +18,8 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Accelerometer {
+#[schemars(rename = "Accelerometer")]
+pub struct AccelerometerGravity {
     /// Largest time difference to the first frame at which a reading is used. A longer window reduces the
     /// effect of accelerations and increases the effect of odometry drift. Unit: seconds.
     pub window: NotNegative,
@@ -34,8 +35,8 @@ pub struct Accelerometer {
 pub struct Quaternion(pub So3);
 
 impl TryFrom<[f64; 4]> for Quaternion {
-    type Error = NotARotation;
-    fn try_from(xyzw: [f64; 4]) -> Result<Self, NotARotation> {
+    type Error = RotationError;
+    fn try_from(xyzw: [f64; 4]) -> Result<Self, RotationError> {
         So3::from_quaternion_xyzw(xyzw).map(Self)
     }
 }
@@ -45,14 +46,14 @@ impl From<Quaternion> for [f64; 4] {
     }
 }
 
-impl Default for Accelerometer {
+impl Default for AccelerometerGravity {
     fn default() -> Self {
         Self { window: NotNegative::literal(10.0), camera_from_sensor: Quaternion(So3::identity()) }
     }
 }
 
 #[typetag::serialize(name = "accelerometer")]
-impl Gravity for Accelerometer {
+impl Gravity for AccelerometerGravity {
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
         let first = first_frame(sequence)?;
         let near = |timestamp: f64| (timestamp - first.timestamp).abs() <= *self.window;
@@ -73,11 +74,11 @@ impl Gravity for Accelerometer {
         Ok(MapFrame::of_odometry(Some(Direction::new(up)?)))
     }
 
-    fn settled_after(&self) -> f64 {
+    fn final_after_s(&self) -> f64 {
         *self.window
     }
 }
-register!(dyn Gravity, "accelerometer", Accelerometer);
+register!(dyn Gravity, "accelerometer", AccelerometerGravity);
 
 /// Returns the frame nearest in time.
 fn frame_at(frames: &[Frame], timestamp: f64) -> Option<&Frame> {
@@ -97,9 +98,9 @@ mod tests {
         Acceleration { timestamp, acceleration: acceleration.into() }
     }
 
-    fn half_turn() -> Accelerometer {
+    fn half_turn() -> AccelerometerGravity {
         let camera_from_sensor = Quaternion(So3::from_quaternion_xyzw([0.0, 0.0, 1.0, 0.0]).unwrap());
-        Accelerometer { window: NotNegative::literal(1.0), camera_from_sensor }
+        AccelerometerGravity { window: NotNegative::literal(1.0), camera_from_sensor }
     }
 
     #[test]
@@ -127,9 +128,9 @@ mod tests {
     #[test]
     fn free_fall_and_silence_are_errors() {
         let fall = vec![reading(10.0, [0.0; 3])];
-        let fall = Accelerometer::default().locate(&Sequence { accelerometer: fall, ..sequence() });
+        let fall = AccelerometerGravity::default().locate(&Sequence { accelerometer: fall, ..sequence() });
         assert!(matches!(fall, Err(GravityError::NoDirection(_))));
-        let silence = Accelerometer::default().locate(&sequence());
+        let silence = AccelerometerGravity::default().locate(&sequence());
         assert!(matches!(silence, Err(GravityError::NoReadings { .. })));
     }
 }

@@ -15,19 +15,20 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct GroundTruthPose {
+#[schemars(rename = "GroundTruthPose")]
+pub struct GroundTruthGravity {
     /// Largest time difference between that pose and the first frame. Unit: seconds.
     pub max_time_difference: NotNegative,
 }
 
-impl Default for GroundTruthPose {
+impl Default for GroundTruthGravity {
     fn default() -> Self {
         Self { max_time_difference: NotNegative::literal(0.1) }
     }
 }
 
 #[typetag::serialize(name = "ground_truth")]
-impl Gravity for GroundTruthPose {
+impl Gravity for GroundTruthGravity {
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
         let first = first_frame(sequence)?;
         let away = |timestamp: f64| (timestamp - first.timestamp).abs();
@@ -46,7 +47,7 @@ impl Gravity for GroundTruthPose {
         }
     }
 }
-register!(dyn Gravity, "ground_truth", GroundTruthPose);
+register!(dyn Gravity, "ground_truth", GroundTruthGravity);
 
 #[cfg(test)]
 mod tests {
@@ -55,14 +56,14 @@ mod tests {
 
     #[test]
     fn the_first_frame_comes_to_lie_on_its_true_pose() {
-        let map = GroundTruthPose::default().locate(&with_truth(10.05)).unwrap();
+        let map = GroundTruthGravity::default().locate(&with_truth(10.05)).unwrap();
         assert_eq!(map.map_from_odometry, upright_camera());
         assert_eq!(map.up, Some(Direction::Z));
     }
 
     #[test]
     fn a_truth_of_another_time_is_refused() {
-        let locate = |sequence| GroundTruthPose::default().locate(&sequence).unwrap_err().to_string();
+        let locate = |sequence| GroundTruthGravity::default().locate(&sequence).unwrap_err().to_string();
         assert!(locate(with_truth(12.0)).contains("the nearest is at 12 s"));
         assert!(locate(sequence()).contains("give the source a ground truth"));
     }

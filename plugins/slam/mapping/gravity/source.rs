@@ -13,12 +13,13 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct FromSource {}
+#[schemars(rename = "FromSource")]
+pub struct SourceGravity {}
 
 #[typetag::serialize(name = "source")]
-impl Gravity for FromSource {
+impl Gravity for SourceGravity {
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
         Ok(MapFrame::of_odometry(sequence.up))
     }
 }
-register!(dyn Gravity, "source", FromSource);
+register!(dyn Gravity, "source", SourceGravity);

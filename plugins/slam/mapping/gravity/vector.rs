@@ -14,15 +14,16 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct UpVector {
+#[schemars(rename = "UpVector")]
+pub struct VectorGravity {
     /// Up direction. Any length except zero.
     pub up: Direction,
 }
 
 #[typetag::serialize(name = "vector")]
-impl Gravity for UpVector {
+impl Gravity for VectorGravity {
     fn locate(&self, _: &Sequence) -> Result<MapFrame, GravityError> {
         Ok(MapFrame::of_odometry(Some(self.up)))
     }
 }
-register!(dyn Gravity, "vector", UpVector);
+register!(dyn Gravity, "vector", VectorGravity);

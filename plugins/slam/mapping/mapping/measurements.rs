@@ -3,10 +3,10 @@
 //! The filters, in this order: boxes without area, detections without an object and detections with a low
 //! score are skipped. The class is fused from all remaining ones. Boxes cut by the border are dropped or lose
 //! a side. If an object has several boxes in one frame, the last one counts.
-use crate::settings::{Anchor, DetectionSettings, Settings};
+use crate::settings::{DetectionSettings, MapAnchor, RunSettings};
 use manifactor_quadric::{BoundingBox, Camera};
-use manifactor_recording::class::Aliases;
-use manifactor_recording::fusion::{FusedClass, Fusion};
+use manifactor_recording::class::ClassAliases;
+use manifactor_recording::fusion::{ClassFusion, FusedClass};
 use manifactor_recording::measurement::Quantities;
 use manifactor_recording::prior_map::PriorObject;
 use manifactor_recording::sequence::{Detection, ObjectId, Sequence};
@@ -27,12 +27,12 @@ pub struct ObjectBox {
 
 /// The measurements of an object.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
+pub struct ObjectMeasurements {
     /// Object id.
     pub id: ObjectId,
     /// The object in the prior map.
     pub prior: Option<Arc<PriorObject>>,
-    fusion: Fusion,
+    fusion: ClassFusion,
     /// Number of detections associated with it.
     pub detections: usize,
     /// Its remaining boxes in the order of frames, at most one per frame.
@@ -43,7 +43,7 @@ pub struct Measured {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Measurements {
     /// Sorted by id.
-    pub objects: Vec<Measured>,
+    pub objects: Vec<ObjectMeasurements>,
     /// Detections without an object.
     pub unassociated: usize,
     /// Boxes without width or height.
@@ -58,30 +58,30 @@ pub struct Measurements {
 
 impl Measurements {
     /// Groups the detections of a sequence by object.
-    pub fn gather(sequence: &Sequence, settings: &Settings) -> Self {
+    pub fn gather(sequence: &Sequence, settings: &RunSettings) -> Self {
         let mut all = Self::new(settings.anchor());
         for detection in &sequence.detections {
-            all.add(detection, &sequence.camera, &settings.detections, &settings.aliases);
+            all.add_detection(detection, &sequence.camera, &settings.detections, &settings.aliases);
         }
         all
     }
 
     /// Starts with the objects of the prior map, without detections.
-    pub fn new(anchor: Option<Anchor<'_>>) -> Self {
+    pub fn new(anchor: Option<MapAnchor<'_>>) -> Self {
         let known = anchor.map_or(&[][..], |anchor| &anchor.map.objects);
-        Self { objects: known.iter().map(Measured::known).collect(), ..Self::default() }
+        Self { objects: known.iter().map(ObjectMeasurements::of_prior_object).collect(), ..Self::default() }
     }
 
     /// Adds a detection to its object.
-    pub fn add(
+    pub fn add_detection(
         &mut self,
         detection: &Detection,
         camera: &Camera,
         settings: &DetectionSettings,
-        aliases: &Aliases,
+        aliases: &ClassAliases,
     ) {
-        let sifted = sift(detection, camera, settings);
-        if let Sifted::WithoutArea = sifted {
+        let sifted = filter_detection(detection, camera, settings);
+        if let FilteredDetection::WithoutArea = sifted {
             self.without_area += 1;
             return;
         }
@@ -89,44 +89,44 @@ impl Measurements {
             self.unassociated += 1;
             return;
         };
-        if let Sifted::LowScore = sifted {
+        if let FilteredDetection::LowScore = sifted {
             self.low_score += 1;
             return;
         }
-        let place = self.place(id);
+        let place = self.object_index(id);
         let Some(object) = self.objects.get_mut(place) else { return };
         object.detections += 1;
         object.fusion.add(&detection.scores, aliases);
         match sifted {
-            Sifted::View(view) => self.duplicates += usize::from(object.see(view)),
+            FilteredDetection::View(view) => self.duplicates += usize::from(object.add_box(view)),
             _ => self.cut += 1,
         }
     }
 
     /// Removes a detection that was assigned to `from`.
-    pub fn take_back(
+    pub fn remove_detection(
         &mut self,
         detection: &Detection,
         from: ObjectId,
         camera: &Camera,
         settings: &DetectionSettings,
-        aliases: &Aliases,
+        aliases: &ClassAliases,
     ) {
-        let sifted = sift(detection, camera, settings);
+        let sifted = filter_detection(detection, camera, settings);
         match sifted {
-            Sifted::WithoutArea => return,
-            Sifted::LowScore => {
+            FilteredDetection::WithoutArea => return,
+            FilteredDetection::LowScore => {
                 self.low_score = self.low_score.saturating_sub(1);
                 return;
             }
-            Sifted::Cut | Sifted::View(_) => {}
+            FilteredDetection::Cut | FilteredDetection::View(_) => {}
         }
         let Ok(place) = self.objects.binary_search_by_key(&from, |object| object.id) else { return };
         let object = &mut self.objects[place];
         object.detections = object.detections.saturating_sub(1);
-        object.fusion.take_back(&detection.scores, aliases);
+        object.fusion.remove(&detection.scores, aliases);
         match sifted {
-            Sifted::View(view) => match object.views.iter().position(|own| *own == view) {
+            FilteredDetection::View(view) => match object.views.iter().position(|own| *own == view) {
                 Some(own) => drop(object.views.remove(own)),
                 // a later box of its frame has replaced it
                 None => self.duplicates = self.duplicates.saturating_sub(1),
@@ -136,7 +136,7 @@ impl Measurements {
     }
 
     /// Removes an object; its detections become unassociated.
-    pub fn disown(&mut self, id: ObjectId) {
+    pub fn remove_object(&mut self, id: ObjectId) {
         if let Ok(place) = self.objects.binary_search_by_key(&id, |object| object.id) {
             self.unassociated += self.objects.remove(place).detections;
         }
@@ -144,10 +144,10 @@ impl Measurements {
 
     /// Merges the measurements of one object into a second one, and returns the boxes that are new to it. If
     /// both have a box in a frame, the second object keeps its own.
-    pub fn merge(&mut self, from: ObjectId, into: ObjectId) -> Vec<ObjectBox> {
+    pub fn merge_objects(&mut self, from: ObjectId, into: ObjectId) -> Vec<ObjectBox> {
         let Ok(place) = self.objects.binary_search_by_key(&from, |object| object.id) else { return vec![] };
         let gone = self.objects.remove(place);
-        let place = self.place(into);
+        let place = self.object_index(into);
         let Some(object) = self.objects.get_mut(place) else { return vec![] };
         object.detections += gone.detections;
         object.fusion.add_all(gone.fusion);
@@ -155,22 +155,22 @@ impl Measurements {
         let (twice, new): (Vec<_>, Vec<_>) = gone.views.into_iter().partition(seen);
         self.duplicates += twice.len();
         for view in &new {
-            object.see(view.clone());
+            object.add_box(view.clone());
         }
         new
     }
 
     /// Returns the object with this id.
-    pub fn object(&self, id: ObjectId) -> Option<&Measured> {
+    pub fn object(&self, id: ObjectId) -> Option<&ObjectMeasurements> {
         let place = self.objects.binary_search_by_key(&id, |object| object.id).ok()?;
         self.objects.get(place)
     }
 
     /// Returns the index of an object, which is created if it is new.
-    fn place(&mut self, id: ObjectId) -> usize {
+    fn object_index(&mut self, id: ObjectId) -> usize {
         let place = self.objects.binary_search_by_key(&id, |object| object.id);
         place.unwrap_or_else(|place| {
-            self.objects.insert(place, Measured::new(id));
+            self.objects.insert(place, ObjectMeasurements::new(id));
             place
         })
     }
@@ -182,7 +182,7 @@ impl Measurements {
 }
 
 /// The possible uses of a detection.
-pub enum Sifted {
+pub enum FilteredDetection {
     /// None: its box has no width or no height.
     WithoutArea,
     /// None: its score is too low.
@@ -194,29 +194,33 @@ pub enum Sifted {
 }
 
 /// Applies the filters to a detection.
-pub fn sift(detection: &Detection, camera: &Camera, settings: &DetectionSettings) -> Sifted {
+pub fn filter_detection(
+    detection: &Detection,
+    camera: &Camera,
+    settings: &DetectionSettings,
+) -> FilteredDetection {
     if !detection.bounding_box.has_area() {
-        return Sifted::WithoutArea;
+        return FilteredDetection::WithoutArea;
     }
     if detection.scores.best().is_some_and(|(_, score)| score < *settings.min_score) {
-        return Sifted::LowScore;
+        return FilteredDetection::LowScore;
     }
     let bounding_box = detection.bounding_box;
     let inside = bounding_box.sides_inside(camera.width, camera.height, *settings.border_px);
     if !settings.cut_sides.accepts(inside) {
-        return Sifted::Cut;
+        return FilteredDetection::Cut;
     }
     let quantities = detection.quantities.clone();
-    Sifted::View(ObjectBox { frame: detection.frame, bounding_box, inside, quantities })
+    FilteredDetection::View(ObjectBox { frame: detection.frame, bounding_box, inside, quantities })
 }
 
-impl Measured {
+impl ObjectMeasurements {
     fn new(id: ObjectId) -> Self {
-        Self { id, prior: None, fusion: Fusion::default(), detections: 0, views: vec![] }
+        Self { id, prior: None, fusion: ClassFusion::default(), detections: 0, views: vec![] }
     }
 
     /// Creates the entry of an object of the prior map.
-    fn known(object: &Arc<PriorObject>) -> Self {
+    fn of_prior_object(object: &Arc<PriorObject>) -> Self {
         Self { fusion: object.classes.clone(), prior: Some(object.clone()), ..Self::new(object.id) }
     }
 
@@ -227,7 +231,7 @@ impl Measured {
     }
 
     /// Adds a box. Returns whether it replaces an earlier box of its frame.
-    fn see(&mut self, view: ObjectBox) -> bool {
+    fn add_box(&mut self, view: ObjectBox) -> bool {
         let place = self.views.binary_search_by_key(&view.frame, |view| view.frame);
         match place {
             Ok(place) => self.views[place] = view,
@@ -237,7 +241,7 @@ impl Measured {
     }
 
     /// Returns the fused class scores of its detections.
-    pub fn classes(&self) -> &Fusion {
+    pub fn classes(&self) -> &ClassFusion {
         &self.fusion
     }
 
@@ -295,7 +299,7 @@ mod tests {
         let camera = sequence().camera;
         let mut all = Measurements::default();
         for detection in detections {
-            all.add(detection, &camera, settings, &Aliases::default());
+            all.add_detection(detection, &camera, settings, &ClassAliases::default());
         }
         all
     }

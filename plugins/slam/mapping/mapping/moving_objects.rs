@@ -6,21 +6,21 @@ use manifactor_quadric::Camera;
 use nalgebra::{Matrix3x4, Matrix4, Vector3, Vector4};
 
 /// Length of the windows in seconds. Odometry counts as exact within a window.
-const WINDOW: f64 = 2.0;
+const WINDOW_S: f64 = 2.0;
 /// Largest allowed value of twice the log-likelihood ratio of moving to standing still. In simulation, it
 /// rejects an object at rest in 2 of 200 trials (`docs/decisions/association.md`).
-const EVIDENCE: f64 = 9.0;
+const MAX_EVIDENCE: f64 = 9.0;
 /// Largest allowed root mean square scatter of the positions within a window, in standard deviations.
-const SCATTER: f64 = 2.0;
+const MAX_SCATTER: f64 = 2.0;
 /// Weight of the prior that scatter is as expected, in number of differences.
-const EXPECTED: f64 = 4.0;
+const SCATTER_PRIOR_WEIGHT: f64 = 4.0;
 /// Standard deviation of the centre of a box, in pixels.
-const CENTRE_PX: f64 = 5.0;
+const CENTRE_SIGMA_PX: f64 = 5.0;
 /// Prior standard deviation of the velocity, in m/s.
-const FAST: f64 = 100.0;
+const SPEED_SIGMA: f64 = 100.0;
 
 /// The centre of an object from a box and its depth.
-struct Place {
+struct PosedCentre {
     /// Unit: seconds.
     time: f64,
     /// Position of the camera in the map frame.
@@ -35,34 +35,34 @@ struct Place {
 ///
 /// # Errors
 /// If the object moves or its positions scatter.
-pub(super) fn still(
+pub(super) fn check_still(
     views: &[ObjectBox],
     at: impl Fn(usize) -> Option<StampedPose>,
     camera: &Camera,
     depth_error: f64,
 ) -> Result<(), Rejection> {
-    let error = depth_error.hypot(CENTRE_PX / camera.fx);
+    let error = depth_error.hypot(CENTRE_SIGMA_PX / camera.fx);
     let place = |view: &ObjectBox| {
         // the border shifts the centre of a box that it cuts
         let depth = view.quantities.depth().filter(|_| view.inside == [true; 4])?;
         let StampedPose { timestamp: time, pose } = at(view.frame)?;
         let place = pose.act(&(camera.ray(view.bounding_box.centre()) * depth));
-        Some(Place { time, camera: pose.translation, place, sigma: depth * error })
+        Some(PosedCentre { time, camera: pose.translation, place, sigma: depth * error })
     };
-    let places: Vec<Place> = views.iter().filter_map(place).collect();
-    let Motion { speed, evidence, scatter } = Motion::of(&places, depth_error);
-    if evidence > EVIDENCE {
-        return Err(Rejection::Moves { speed, evidence, limit: EVIDENCE });
+    let places: Vec<PosedCentre> = views.iter().filter_map(place).collect();
+    let MotionStatistics { speed, evidence, scatter } = MotionStatistics::from_centres(&places, depth_error);
+    if evidence > MAX_EVIDENCE {
+        return Err(Rejection::Moves { speed, evidence, limit: MAX_EVIDENCE });
     }
-    if scatter > SCATTER {
-        return Err(Rejection::Scatters { scatter: scatter * error, limit: SCATTER * error });
+    if scatter > MAX_SCATTER {
+        return Err(Rejection::Scatters { scatter: scatter * error, limit: MAX_SCATTER * error });
     }
     Ok(())
 }
 
 /// Test statistics of the motion of an object.
 #[derive(Debug, Default)]
-struct Motion {
+struct MotionStatistics {
     /// Unit: m/s.
     speed: f64,
     /// Twice the log-likelihood ratio of this motion to standing still.
@@ -71,18 +71,18 @@ struct Motion {
     scatter: f64,
 }
 
-impl Motion {
+impl MotionStatistics {
     /// Compares two hypotheses. Moving: within each window the positions follow a line, with one velocity
     /// common to all windows. This also covers several objects that pass through one place in turn. Standing
     /// still: one position per window. All depths may share a scale error: with standard deviation
     /// `depth_error` for an object at rest, of any size for a moving one.
-    fn of(places: &[Place], depth_error: f64) -> Self {
+    fn from_centres(places: &[PosedCentre], depth_error: f64) -> Self {
         let (mut information, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
         let (mut squares, mut differences) = (0.0_f64, 0.0);
-        let window = |place: &Place| (place.time / WINDOW).floor();
+        let window = |place: &PosedCentre| (place.time / WINDOW_S).floor();
         for window in places.chunk_by(|a, b| window(a) == window(b)).filter(|window| window.len() > 1) {
             let n = window.len() as f64;
-            let mean = |of: fn(&Place) -> Vector3<f64>| window.iter().map(of).sum::<Vector3<f64>>() / n;
+            let mean = |of: fn(&PosedCentre) -> Vector3<f64>| window.iter().map(of).sum::<Vector3<f64>>() / n;
             let (camera, centre) = (mean(|place| place.camera), mean(|place| place.place));
             let time = window.iter().map(|place| place.time).sum::<f64>() / n;
             let sigma = window.iter().map(|place| place.sigma).sum::<f64>() / n;
@@ -101,7 +101,7 @@ impl Motion {
             differences += n - 1.0;
         }
         let still = gradient[3].powi(2) / (information[(3, 3)] + depth_error.powi(-2));
-        let weak = Vector4::new(FAST.powi(-2), FAST.powi(-2), FAST.powi(-2), 1.0);
+        let weak = Vector4::new(SPEED_SIGMA.powi(-2), SPEED_SIGMA.powi(-2), SPEED_SIGMA.powi(-2), 1.0);
         match (information + Matrix4::from_diagonal(&weak)).cholesky() {
             Some(factor) if differences > 0.0 => {
                 let moving = factor.solve(&gradient);
@@ -109,7 +109,7 @@ impl Motion {
                 Self {
                     speed: moving.xyz().norm(),
                     evidence,
-                    scatter: ((squares + EXPECTED) / (differences + EXPECTED)).sqrt(),
+                    scatter: ((squares + SCATTER_PRIOR_WEIGHT) / (differences + SCATTER_PRIOR_WEIGHT)).sqrt(),
                 }
             }
             // no two positions in one window
@@ -127,14 +127,14 @@ mod tests {
 
     /// A measured position of an object at `x`, from a camera that moves along x at 2 m/s. `factor` scales
     /// the depth.
-    fn seen(time: f64, x: f64, factor: f64) -> Place {
+    fn centre_from_moving_camera(time: f64, x: f64, factor: f64) -> PosedCentre {
         let camera = Vector3::new(2.0 * time, 0.0, 0.0);
         let sight = (Vector3::new(x, 0.0, 7.0) - camera) * factor;
-        Place { time, camera, place: camera + sight, sigma: 0.03 * sight.z }
+        PosedCentre { time, camera, place: camera + sight, sigma: 0.03 * sight.z }
     }
 
-    fn at(time: f64, x: f64) -> Place {
-        seen(time, x, 1.0)
+    fn exact_centre(time: f64, x: f64) -> PosedCentre {
+        centre_from_moving_camera(time, x, 1.0)
     }
 
     /// Ten frames per second in every even second, from 0 to 6 s.
@@ -144,31 +144,32 @@ mod tests {
 
     #[test]
     fn things_that_pass_through_one_place_move() {
-        let places: Vec<Place> = times().map(|time| at(time, 20.0 + 5.0 * time.rem_euclid(2.0))).collect();
-        let Motion { speed, evidence, .. } = Motion::of(&places, 0.03);
-        assert!((speed - 5.0).abs() < 0.1 && evidence > EVIDENCE, "{speed} {evidence}");
+        let places: Vec<PosedCentre> =
+            times().map(|time| exact_centre(time, 20.0 + 5.0 * time.rem_euclid(2.0))).collect();
+        let MotionStatistics { speed, evidence, .. } = MotionStatistics::from_centres(&places, 0.03);
+        assert!((speed - 5.0).abs() < 0.1 && evidence > MAX_EVIDENCE, "{speed} {evidence}");
     }
 
     #[test]
     fn two_things_at_once_are_not_one_that_stands_still() {
-        let places: Vec<Place> =
-            times().enumerate().map(|(i, time)| at(time, 20.0 + (i % 2) as f64)).collect();
-        let Motion { evidence, scatter, .. } = Motion::of(&places, 0.03);
-        assert!(evidence < EVIDENCE && scatter > SCATTER, "{evidence} {scatter}");
+        let places: Vec<PosedCentre> =
+            times().enumerate().map(|(i, time)| exact_centre(time, 20.0 + (i % 2) as f64)).collect();
+        let MotionStatistics { evidence, scatter, .. } = MotionStatistics::from_centres(&places, 0.03);
+        assert!(evidence < MAX_EVIDENCE && scatter > MAX_SCATTER, "{evidence} {scatter}");
     }
 
     #[test]
     fn what_stands_still_does_not_move_though_depths_are_off_and_odometry_drifts() {
         for places in [
-            times().map(|time| seen(time, 20.0, 1.05)).collect::<Vec<_>>(),
-            times().map(|time| at(time, 20.0 + 0.3 * time)).collect(),
-            times().map(|time| at(time, 20.0 + 0.4 * (40.0 * time).sin())).collect(),
+            times().map(|time| centre_from_moving_camera(time, 20.0, 1.05)).collect::<Vec<_>>(),
+            times().map(|time| exact_centre(time, 20.0 + 0.3 * time)).collect(),
+            times().map(|time| exact_centre(time, 20.0 + 0.4 * (40.0 * time).sin())).collect(),
             vec![],
-            vec![at(1.0, 20.0), at(3.0, 25.0)],
-            vec![at(1.0, 20.0)],
+            vec![exact_centre(1.0, 20.0), exact_centre(3.0, 25.0)],
+            vec![exact_centre(1.0, 20.0)],
         ] {
-            let motion = Motion::of(&places, 0.03);
-            assert!(motion.evidence < EVIDENCE && motion.scatter < SCATTER, "{motion:?}");
+            let motion = MotionStatistics::from_centres(&places, 0.03);
+            assert!(motion.evidence < MAX_EVIDENCE && motion.scatter < MAX_SCATTER, "{motion:?}");
         }
     }
 
@@ -178,19 +179,24 @@ mod tests {
         let step = 1.0 / f64::from(frames_per_second);
         let kept = if lasts > 0.0 { (-step / lasts).exp() } else { 0.0 };
         let mut error: f64 = StandardNormal.sample(errors);
-        let places: Vec<Place> = (0..15 * frames_per_second)
+        let places: Vec<PosedCentre> = (0..15 * frames_per_second)
             .map(|i| {
                 let time = f64::from(i) * step;
                 let draw: f64 = StandardNormal.sample(errors);
                 error = kept * error + (1.0 - kept * kept).sqrt() * draw;
                 let camera = Vector3::new((0.3 * time).sin(), 0.0, 0.3 * (0.5 * time).sin());
                 let sight = Vector3::new(0.0, 0.0, 2.0) - camera;
-                Place { time, camera, place: camera + sight * (1.0 + 0.03 * error), sigma: 0.03 * sight.z }
+                PosedCentre {
+                    time,
+                    camera,
+                    place: camera + sight * (1.0 + 0.03 * error),
+                    sigma: 0.03 * sight.z,
+                }
             })
             .collect();
         (3..places.len()).step_by(frames_per_second as usize / 5).all(|end| {
-            let motion = Motion::of(&places[..end], 0.03);
-            motion.evidence < EVIDENCE && motion.scatter < SCATTER
+            let motion = MotionStatistics::from_centres(&places[..end], 0.03);
+            motion.evidence < MAX_EVIDENCE && motion.scatter < MAX_SCATTER
         })
     }
 

@@ -1,9 +1,9 @@
 //! Selection of the objects to map, and their initial values.
 use super::moving_objects;
-use crate::mapping::measurements::{Measured, ObjectBox};
-use crate::settings::{ObjectSettings, Settings};
+use crate::mapping::measurements::{ObjectBox, ObjectMeasurements};
+use crate::settings::{ObjectSettings, RunSettings};
 use manifactor_formats::tum::StampedPose;
-use manifactor_quadric::initialise::{View, parallax};
+use manifactor_quadric::initialise::{ObjectView, parallax};
 use manifactor_quadric::{Camera, DualQuadric};
 use serde::Serialize;
 use std::fmt;
@@ -104,25 +104,25 @@ impl fmt::Display for Rejection {
 
 /// Returns the initial ellipsoid of an object, in the frame of the poses. `at` returns time and pose of a
 /// frame.
-pub fn start(
-    measured: &Measured,
+pub fn initial_quadric(
+    measured: &ObjectMeasurements,
     at: impl Fn(usize) -> Option<StampedPose>,
     camera: Camera,
-    Settings { objects: settings, detections, .. }: &Settings,
+    RunSettings { objects: settings, detections, .. }: &RunSettings,
 ) -> Result<DualQuadric, Rejection> {
     if let Some(prior) = &measured.prior {
         return Ok(prior.quadric);
     }
-    sound(measured, settings)?;
+    check_boxes(measured, settings)?;
     let seen = |view: &ObjectBox| {
         let pose = at(view.frame)?.pose;
-        Some(View {
+        Some(ObjectView {
             observed: view.inside,
             depth: view.quantities.depth(),
-            ..View::new(pose, camera, view.bounding_box)
+            ..ObjectView::new(pose, camera, view.bounding_box)
         })
     };
-    let views: Vec<View> = measured.views.iter().filter_map(seen).collect();
+    let views: Vec<ObjectView> = measured.views.iter().filter_map(seen).collect();
     // the parallax compares all pairs of views, so skip it if there is no limit
     let parallax_deg = if *settings.min_parallax_deg > 0.0 { parallax(&views) } else { 0.0 };
     if parallax_deg < *settings.min_parallax_deg {
@@ -130,13 +130,13 @@ pub fn start(
     }
     let started = settings.initialiser.initialise(&views);
     let start = started.map_err(|error| Rejection::Initialisation { message: error.to_string() })?;
-    still(measured, &measured.views, at, &camera, *detections.depth_error).map(|()| start)
+    check_still(measured, &measured.views, at, &camera, *detections.depth_error).map(|()| start)
 }
 
 /// Checks that an object stands still, according to the depths of these boxes. Objects of the prior map
 /// always pass.
-pub fn still(
-    measured: &Measured,
+pub fn check_still(
+    measured: &ObjectMeasurements,
     views: &[ObjectBox],
     at: impl Fn(usize) -> Option<StampedPose>,
     camera: &Camera,
@@ -145,11 +145,11 @@ pub fn still(
     if measured.prior.is_some() {
         return Ok(());
     }
-    moving_objects::still(views, at, camera, depth_error)
+    moving_objects::check_still(views, at, camera, depth_error)
 }
 
 /// Checks that an object has enough boxes of consistent size. Objects of the prior map always pass.
-pub fn sound(measured: &Measured, settings: &ObjectSettings) -> Result<(), Rejection> {
+pub fn check_boxes(measured: &ObjectMeasurements, settings: &ObjectSettings) -> Result<(), Rejection> {
     if measured.prior.is_some() {
         return Ok(());
     }

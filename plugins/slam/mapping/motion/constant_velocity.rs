@@ -1,4 +1,4 @@
-use super::{MotionError, MotionModel, Step, pose_key};
+use super::{MotionError, MotionModel, MotionStep, pose_key};
 use manifactor_geometry::{Prior, Se3, Twist};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{FactorEntry, Key, Manifold, Noise, Values, register};
@@ -18,7 +18,8 @@ use std::sync::Arc;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct ConstantVelocity {
+#[schemars(rename = "ConstantVelocity")]
+pub struct ConstantVelocityMotion {
     /// Noise density of the angular acceleration. Unit: rad/s²/√Hz.
     pub angular_acceleration: Positive,
     /// Noise density of the linear acceleration. Unit: m/s²/√Hz.
@@ -29,7 +30,7 @@ pub struct ConstantVelocity {
     pub first_linear: Positive,
 }
 
-impl Default for ConstantVelocity {
+impl Default for ConstantVelocityMotion {
     fn default() -> Self {
         Self {
             angular_acceleration: Positive::literal(0.5),
@@ -40,8 +41,8 @@ impl Default for ConstantVelocity {
     }
 }
 
-impl ConstantVelocity {
-    fn entry(&self, step: &Step<'_>) -> Result<FactorEntry, MotionError> {
+impl ConstantVelocityMotion {
+    fn entry(&self, step: &MotionStep<'_>) -> Result<FactorEntry, MotionError> {
         let seconds = Positive::new(step.seconds).map_err(|error| step.error(&error))?;
         let factor = manifactor_geometry::ConstantVelocity { seconds };
         let noise = factor.noise(self.angular_acceleration, self.linear_acceleration);
@@ -52,7 +53,7 @@ impl ConstantVelocity {
     }
 
     /// Returns the prior on the first velocity.
-    fn first(&self, step: &Step<'_>) -> Result<FactorEntry, MotionError> {
+    fn first(&self, step: &MotionStep<'_>) -> Result<FactorEntry, MotionError> {
         let [angular, linear] = [self.first_angular.get(), self.first_linear.get()];
         let noise = Noise::sigmas(&[angular, angular, angular, linear, linear, linear]);
         Ok(FactorEntry {
@@ -71,14 +72,14 @@ fn velocity_key(frame: usize) -> Key {
 }
 
 /// Returns the estimated velocity of a frame.
-fn velocity(step: &Step<'_>, frame: usize) -> Option<Twist> {
+fn velocity(step: &MotionStep<'_>, frame: usize) -> Option<Twist> {
     let estimate = (step.estimates)(velocity_key(frame).as_str())?;
     estimate.erased().as_any().downcast_ref::<Twist>().copied()
 }
 
 #[typetag::serialize(name = "constant_velocity")]
-impl MotionModel for ConstantVelocity {
-    fn predict(&self, step: &Step<'_>, from: &Se3) -> Se3 {
+impl MotionModel for ConstantVelocityMotion {
+    fn predict(&self, step: &MotionStep<'_>, from: &Se3) -> Se3 {
         // before the first velocity exists, odometry is the better prediction
         velocity(step, step.frames[0]).map_or_else(
             || from.compose(&step.odometry.pose),
@@ -86,7 +87,7 @@ impl MotionModel for ConstantVelocity {
         )
     }
 
-    fn variables(&self, step: &Step<'_>, [from, to]: [&Se3; 2]) -> Values {
+    fn variables(&self, step: &MotionStep<'_>, [from, to]: [&Se3; 2]) -> Values {
         let twist = Twist(Se3::identity().local(&from.between(to)) / step.seconds);
         let mut values = Values::new();
         for frame in step.frames.into_iter().filter(|frame| velocity(step, *frame).is_none()) {
@@ -95,7 +96,7 @@ impl MotionModel for ConstantVelocity {
         values
     }
 
-    fn factors(&self, step: &Step<'_>) -> Result<Vec<FactorEntry>, MotionError> {
+    fn factors(&self, step: &MotionStep<'_>) -> Result<Vec<FactorEntry>, MotionError> {
         // the prior is added together with the first velocity
         let first = velocity(step, step.frames[0]).is_none().then(|| self.first(step));
         first.into_iter().chain([self.entry(step)]).collect()
@@ -105,4 +106,4 @@ impl MotionModel for ConstantVelocity {
         &["v"]
     }
 }
-register!(dyn MotionModel, "constant_velocity", ConstantVelocity);
+register!(dyn MotionModel, "constant_velocity", ConstantVelocityMotion);

@@ -1,4 +1,4 @@
-use super::{MotionError, MotionModel, RelativePose, Step, pose_key};
+use super::{MotionError, MotionModel, MotionStep, RelativePose, pose_key};
 use manifactor_geometry::{Between, Se3};
 use manifactor_graph::{FactorEntry, register};
 use schemars::JsonSchema;
@@ -13,15 +13,16 @@ use std::sync::Arc;
 /// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Odometry {}
+#[schemars(rename = "Odometry")]
+pub struct OdometryMotion {}
 
 #[typetag::serialize(name = "odometry")]
-impl MotionModel for Odometry {
-    fn predict(&self, step: &Step<'_>, from: &Se3) -> Se3 {
+impl MotionModel for OdometryMotion {
+    fn predict(&self, step: &MotionStep<'_>, from: &Se3) -> Se3 {
         from.compose(&step.odometry.pose)
     }
 
-    fn factors(&self, step: &Step<'_>) -> Result<Vec<FactorEntry>, MotionError> {
+    fn factors(&self, step: &MotionStep<'_>) -> Result<Vec<FactorEntry>, MotionError> {
         let RelativePose { pose, noise, loss } = step.odometry;
         Ok(vec![FactorEntry {
             keys: step.frames.map(pose_key).to_vec(),
@@ -32,4 +33,4 @@ impl MotionModel for Odometry {
         }])
     }
 }
-register!(dyn MotionModel, "odometry", Odometry);
+register!(dyn MotionModel, "odometry", OdometryMotion);

@@ -1,15 +1,15 @@
 //! Application of rules to objects: the factors, each with its reason.
-use super::{Rule, RuleError};
+use super::{RuleError, SemanticRule};
 use manifactor_graph::{Direction, FactorEntry, Key};
 use manifactor_quadric::DualQuadric;
-use manifactor_recording::class::Aliases;
+use manifactor_recording::class::ClassAliases;
 use manifactor_recording::fusion::FusedClass;
 use serde::Serialize;
 use std::collections::HashSet;
 
 /// A mapped object that rules are applied to.
 #[derive(Debug, Clone)]
-pub struct Candidate {
+pub struct RuleCandidate {
     /// Key in the graph.
     pub key: Key,
     /// Class from all detections.
@@ -20,7 +20,7 @@ pub struct Candidate {
     pub known: bool,
 }
 
-impl Candidate {
+impl RuleCandidate {
     pub(super) fn class_name(&self) -> &str {
         self.class.as_ref().map_or("", |class| &class.name)
     }
@@ -28,7 +28,7 @@ impl Candidate {
 
 /// A factor that a rule added.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Applied {
+pub struct AppliedRule {
     /// Type of the factor.
     pub factor: String,
     /// Number of the rule in the document, from 1.
@@ -41,7 +41,7 @@ pub struct Applied {
 
 /// A rule that names an object's class but does not apply to it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LeftOut {
+pub struct SkippedRule {
     /// The type of the rule's factor.
     pub factor: String,
     /// Number of the rule in the document, from 1.
@@ -52,45 +52,45 @@ pub struct LeftOut {
 
 /// Result of all rules for one object.
 #[derive(Debug, Clone, Default)]
-pub struct Verdict {
+pub struct RuleVerdict {
     /// Factors to add.
     pub entries: Vec<FactorEntry>,
     /// The factors that were added, with reasons.
-    pub applied: Vec<Applied>,
+    pub applied: Vec<AppliedRule>,
     /// Rules of the object's class that do not apply.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<SkippedRule>,
 }
 
 /// Applies rules to one object after another.
 #[derive(Debug)]
-pub(crate) struct Judge<'a> {
-    rules: &'a [Rule],
-    aliases: &'a Aliases,
+pub(crate) struct RuleEvaluator<'a> {
+    rules: &'a [SemanticRule],
+    aliases: &'a ClassAliases,
     up: Option<Direction>,
     /// All mapped objects.
-    objects: Vec<Candidate>,
-    connected: Connected,
+    objects: Vec<RuleCandidate>,
+    connected: ConnectedKeys,
 }
 
 /// Keys of the objects that a rule has connected, with the index of the rule. Two objects are near each other
 /// from both sides, and this set prevents a second factor.
-pub(crate) type Connected = HashSet<(usize, Vec<Key>)>;
+pub(crate) type ConnectedKeys = HashSet<(usize, Vec<Key>)>;
 
-impl<'a> Judge<'a> {
+impl<'a> RuleEvaluator<'a> {
     /// Creates the judge for all mapped `objects`; `connected` contains those that rules have connected
     /// before.
     pub(crate) fn new(
-        rules: &'a [Rule],
-        aliases: &'a Aliases,
+        rules: &'a [SemanticRule],
+        aliases: &'a ClassAliases,
         up: Option<Direction>,
-        objects: Vec<Candidate>,
-        connected: Connected,
+        objects: Vec<RuleCandidate>,
+        connected: ConnectedKeys,
     ) -> Self {
         Self { rules, aliases, up, objects, connected }
     }
 
     /// Returns the objects that rules have connected.
-    pub(crate) fn into_connected(self) -> Connected {
+    pub(crate) fn into_connected(self) -> ConnectedKeys {
         self.connected
     }
 
@@ -98,14 +98,14 @@ impl<'a> Judge<'a> {
     ///
     /// # Errors
     /// If a rule needs the up direction and it is unknown.
-    pub(crate) fn judge(&mut self, object: &Candidate) -> Result<Verdict, RuleError> {
-        let mut verdict = Verdict::default();
+    pub(crate) fn evaluate_object(&mut self, object: &RuleCandidate) -> Result<RuleVerdict, RuleError> {
+        let mut verdict = RuleVerdict::default();
         for (i, rule) in self.rules.iter().enumerate() {
-            let Some(share) = rule.share(object.class.as_ref(), self.aliases) else { continue };
-            let factor = rule.factor.name().to_owned();
+            let Some(share) = rule.factor_probability(object.class.as_ref(), self.aliases) else { continue };
+            let factor = rule.factor.factor_type().to_owned();
             if object.known {
                 let because = "the prior map has it, with what rules said of it then".to_owned();
-                verdict.left_out.push(LeftOut { factor, rule: i + 1, because });
+                verdict.left_out.push(SkippedRule { factor, rule: i + 1, because });
                 continue;
             }
             if self.up.is_none() && rule.near.as_ref().is_some_and(|near| near.below) {
@@ -115,18 +115,28 @@ impl<'a> Judge<'a> {
                 Ok((keys, mut because)) => {
                     because.insert(0, rule.class_in_words(object, share));
                     verdict.entries.push(rule.entry(keys.clone(), self.up, share)?);
-                    verdict.applied.push(Applied { factor, rule: i + 1, keys, because: because.join(", ") });
+                    verdict.applied.push(AppliedRule {
+                        factor,
+                        rule: i + 1,
+                        keys,
+                        because: because.join(", "),
+                    });
                 }
-                Err(because) => verdict.left_out.push(LeftOut { factor, rule: i + 1, because }),
+                Err(because) => verdict.left_out.push(SkippedRule { factor, rule: i + 1, because }),
             }
         }
         Ok(verdict)
     }
 
     /// Returns the variables of a rule's factor with the reasons, or the reason why there is no factor.
-    fn keys(&mut self, i: usize, rule: &Rule, object: &Candidate) -> Result<(Vec<Key>, Vec<String>), String> {
+    fn keys(
+        &mut self,
+        i: usize,
+        rule: &SemanticRule,
+        object: &RuleCandidate,
+    ) -> Result<(Vec<Key>, Vec<String>), String> {
         let partners = rule.factor.partners();
-        let met = rule.met(object, &self.objects, partners, self.up, self.aliases)?;
+        let met = rule.check_conditions(object, &self.objects, partners, self.up, self.aliases)?;
         let others: Vec<Key> = met.others.iter().take(partners).map(|other| other.key.clone()).collect();
         if partners > 0 {
             let mut all = others.clone();

@@ -1,9 +1,9 @@
 //! Conditions of a rule besides the class: score, size and nearby objects.
-use super::{ANY, Candidate, Rule};
+use super::{ANY_CLASS, RuleCandidate, SemanticRule};
 use manifactor_graph::Direction;
 use manifactor_graph::checked::{Positive, Share};
 use manifactor_quadric::DualQuadric;
-use manifactor_recording::class::Aliases;
+use manifactor_recording::class::ClassAliases;
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,9 +12,10 @@ use serde::{Deserialize, Serialize};
 /// one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Near {
+#[schemars(rename = "Near")]
+pub struct NearCondition {
     /// Classes of the second object. Default: any.
-    #[serde(default = "any")]
+    #[serde(default = "any_class")]
     pub classes: Vec<String>,
     /// Largest gap between the two objects at their initial values, along the line through their centres.
     /// Unit: metres.
@@ -24,26 +25,26 @@ pub struct Near {
     pub below: bool,
 }
 
-fn any() -> Vec<String> {
-    vec![ANY.to_owned()]
+fn any_class() -> Vec<String> {
+    vec![ANY_CLASS.to_owned()]
 }
 
 /// Reasons why a rule applies to an object, and the objects near it.
-pub(super) struct Met<'a> {
+pub(super) struct MetConditions<'a> {
     pub because: Vec<String>,
-    pub others: Vec<&'a Candidate>,
+    pub others: Vec<&'a RuleCandidate>,
 }
 
-impl Rule {
+impl SemanticRule {
     /// Checks the conditions for an object among all. `Err` describes the condition that fails.
-    pub(super) fn met<'a>(
+    pub(super) fn check_conditions<'a>(
         &self,
-        object: &Candidate,
-        all: &'a [Candidate],
+        object: &RuleCandidate,
+        all: &'a [RuleCandidate],
         wanted: usize,
         up: Option<Direction>,
-        aliases: &Aliases,
-    ) -> Result<Met<'a>, String> {
+        aliases: &ClassAliases,
+    ) -> Result<MetConditions<'a>, String> {
         let (mut because, score) = (vec![], object.class.as_ref().map_or(0.0, |class| class.score));
         let mut require = |holds: bool, what: String, bound: String| {
             if holds {
@@ -62,11 +63,11 @@ impl Rule {
         if let Some(most) = self.max_size_m.map(Positive::get) {
             require(size <= most, format!("{size:.2} m long"), format!("at most {most} m"))?;
         }
-        let Some(near) = &self.near else { return Ok(Met { because, others: vec![] }) };
-        let found = near.of(object, all, up, aliases);
+        let Some(near) = &self.near else { return Ok(MetConditions { because, others: vec![] }) };
+        let found = near.near_objects(object, all, up, aliases);
         let within = found.iter().filter(|(gap, _)| *gap <= near.within_m.get()).count();
         if within < wanted.max(1) {
-            return Err(near.in_vain(&found, wanted.max(1)));
+            return Err(near.failed_condition(&found, wanted.max(1)));
         }
         let chosen = found.into_iter().take(wanted.max(1));
         let others = chosen.map(|(gap, other)| {
@@ -74,25 +75,25 @@ impl Rule {
             other
         });
         let others = others.collect();
-        Ok(Met { because, others })
+        Ok(MetConditions { because, others })
     }
 }
 
-impl Near {
+impl NearCondition {
     /// Returns the objects of the required classes, and below if required, with their gaps. The nearest comes
     /// first.
-    fn of<'a>(
+    fn near_objects<'a>(
         &self,
-        object: &Candidate,
-        all: &'a [Candidate],
+        object: &RuleCandidate,
+        all: &'a [RuleCandidate],
         up: Option<Direction>,
-        aliases: &Aliases,
-    ) -> Vec<(f64, &'a Candidate)> {
-        let fits = |other: &&Candidate| {
+        aliases: &ClassAliases,
+    ) -> Vec<(f64, &'a RuleCandidate)> {
+        let fits = |other: &&RuleCandidate| {
             let lower =
                 up.is_some_and(|up| (other.start.centroid() - object.start.centroid()).dot(&up) < 0.0);
             other.key != object.key
-                && super::names(&self.classes, other.class_name(), aliases)
+                && super::contains_class(&self.classes, other.class_name(), aliases)
                 && (lower || !self.below)
         };
         let others = all.iter().filter(fits);
@@ -101,9 +102,12 @@ impl Near {
         found
     }
 
-    fn in_vain(&self, found: &[(f64, &Candidate)], wanted: usize) -> String {
-        let what =
-            if self.classes.iter().any(|c| c == ANY) { "object".into() } else { self.classes.join(" or ") };
+    fn failed_condition(&self, found: &[(f64, &RuleCandidate)], wanted: usize) -> String {
+        let what = if self.classes.iter().any(|c| c == ANY_CLASS) {
+            "object".into()
+        } else {
+            self.classes.join(" or ")
+        };
         let lower = if self.below { " below" } else { "" };
         let nearest = match found.first() {
             Some((gap, other)) => format!("the nearest is {}, {gap:.2} m away", other.key),

@@ -1,5 +1,5 @@
 //! `semantics = "table_one"`, `semantics = "my_rules.toml"`, or `[[semantics]]` rule by rule.
-use super::{Rule, SHIPPED, shipped};
+use super::{SHIPPED_RULES, SemanticRule, shipped_text};
 use manifactor_config::{Diagnostics, Document, Errors, Fault, Format, Node, Value, nearest, quoted_list};
 use manifactor_graph::Values;
 use schemars::JsonSchema;
@@ -13,7 +13,7 @@ pub enum SemanticsDocument {
     /// Name of a shipped table, or path of a file.
     Named(String),
     /// List of rules.
-    Rules(Vec<Rule>),
+    Rules(Vec<SemanticRule>),
 }
 
 /// A file of semantic rules. A run includes it with `semantics = "this_file.toml"`.
@@ -21,7 +21,7 @@ pub enum SemanticsDocument {
 #[serde(deny_unknown_fields)]
 pub struct RulesDocument {
     /// Rules that assign factors to objects.
-    #[schemars(with = "Vec<Rule>")]
+    #[schemars(with = "Vec<SemanticRule>")]
     semantics: Vec<Node>,
 }
 
@@ -32,20 +32,21 @@ pub(crate) fn read_semantics(
     folder: &Path,
     own: &Values,
     errors: &Errors,
-) -> Vec<Rule> {
+) -> Vec<SemanticRule> {
     match semantics {
         None => Vec::new(),
         Some(Node { place, value: Value::String(name) }) => match rules_named(name, folder, own) {
             Ok(rules) => rules,
-            Err(Unread::Unknown) => {
-                let known: Vec<String> = SHIPPED.iter().map(|s| (*s).to_owned()).collect();
-                let meant = nearest(name, SHIPPED).map_or(String::new(), |n| format!("did you mean `{n}`? "));
+            Err(ReadFailure::Unknown) => {
+                let known: Vec<String> = SHIPPED_RULES.iter().map(|s| (*s).to_owned()).collect();
+                let meant =
+                    nearest(name, SHIPPED_RULES).map_or(String::new(), |n| format!("did you mean `{n}`? "));
                 let help =
                     format!("{meant}there is {}, or give the path of a .toml file", quoted_list(&known));
                 errors.report(place.clone(), Fault::with_help(format!("unknown semantics `{name}`"), help));
                 Vec::new()
             }
-            Err(Unread::Wrong(diagnostics)) => {
+            Err(ReadFailure::Wrong(diagnostics)) => {
                 errors.extend(diagnostics);
                 Vec::new()
             }
@@ -60,16 +61,16 @@ pub(crate) fn read_semantics(
 }
 
 /// Reads each rule over the document's own variables. Errors are reported, and the rule is left out.
-fn rules(items: &[Node], own: &Values, errors: &Errors) -> Vec<Rule> {
+fn rules(items: &[Node], own: &Values, errors: &Errors) -> Vec<SemanticRule> {
     let read = |item: &Node| {
-        let rule = item.read::<Rule>(errors)?;
+        let rule = item.read::<SemanticRule>(errors)?;
         rule.check(item, own, errors)?;
         Some(rule)
     };
     items.iter().filter_map(read).collect()
 }
 
-impl Rule {
+impl SemanticRule {
     /// Checks that the rule is consistent. Errors are reported at their position.
     fn check(&self, written: &Node, own: &Values, errors: &Errors) -> Option<()> {
         let place = written.field("factor").unwrap_or(written).place.clone();
@@ -80,7 +81,7 @@ impl Rule {
         }
         if self.factor.partners() > 0 && self.near.is_none() {
             let message =
-                format!("`{}` connects objects, and the rule does not say which", self.factor.name());
+                format!("`{}` connects objects, and the rule does not say which", self.factor.factor_type());
             let help = "say where the other one is: near = { classes = [\"tv monitor\"], within_m = 0.5 }";
             errors.report(place, Fault::with_help(message, help));
             return None;
@@ -89,30 +90,30 @@ impl Rule {
     }
 }
 
-enum Unread {
+enum ReadFailure {
     Unknown,
     Wrong(Diagnostics),
 }
 
-fn rules_named(name: &str, folder: &Path, own: &Values) -> Result<Vec<Rule>, Unread> {
-    match shipped(name) {
-        Some(text) => shipped_rules(name, text).map_err(Unread::Wrong),
+fn rules_named(name: &str, folder: &Path, own: &Values) -> Result<Vec<SemanticRule>, ReadFailure> {
+    match shipped_text(name) {
+        Some(text) => shipped_rules(name, text).map_err(ReadFailure::Wrong),
         None if Format::of_path(name).is_some() => Document::open(folder.join(name))
             .and_then(|document| rules_of(&document, own))
-            .map_err(Unread::Wrong),
-        None => Err(Unread::Unknown),
+            .map_err(ReadFailure::Wrong),
+        None => Err(ReadFailure::Unknown),
     }
 }
 
 /// Reads the rules of a shipped file.
-pub(super) fn shipped_rules(name: &str, text: &str) -> Result<Vec<Rule>, Diagnostics> {
+pub(super) fn shipped_rules(name: &str, text: &str) -> Result<Vec<SemanticRule>, Diagnostics> {
     let document = Document::parse(format!("{name}.toml"), text, Format::Toml)?;
     let rules = rules_of(&document, &Values::new())?;
-    Ok(rules.into_iter().map(|rule| Rule { shipped: true, ..rule }).collect())
+    Ok(rules.into_iter().map(|rule| SemanticRule { shipped: true, ..rule }).collect())
 }
 
 /// Reads the rules of a document that contains nothing else.
-fn rules_of(document: &Document, own: &Values) -> Result<Vec<Rule>, Diagnostics> {
+fn rules_of(document: &Document, own: &Values) -> Result<Vec<SemanticRule>, Diagnostics> {
     let errors = Errors::new();
     let read = document.root().read::<RulesDocument>(&errors);
     let rules = read.map(|document| rules(&document.semantics, own, &errors));

@@ -68,7 +68,7 @@ impl RuleFactor {
     }
 
     /// Returns the type of the factor.
-    pub fn name(&self) -> &'static str {
+    pub fn factor_type(&self) -> &'static str {
         self.factor.typetag_name()
     }
 
@@ -106,8 +106,11 @@ impl RuleFactor {
         if wanted.len() != with.len() {
             let types: Vec<_> = wanted.iter().map(|id| format!("a `{}`", manifold_name(**id))).collect();
             let types = if types.is_empty() { "nothing".into() } else { types.join(" and ") };
-            let message =
-                format!("besides objects `{}` connects {types}, found {} in `with`", self.name(), with.len());
+            let message = format!(
+                "besides objects `{}` connects {types}, found {} in `with`",
+                self.factor_type(),
+                with.len()
+            );
             let help =
                 "declare such variables as `[[variables]]` and name them in their order: with = [\"table\"]";
             errors.report(place.clone(), Fault::with_help(message, help));
@@ -118,7 +121,7 @@ impl RuleFactor {
             match own.variable(key.as_str()) {
                 Some(found) if found.typetag_name() == expected => {}
                 Some(found) => {
-                    let (name, found) = (self.name(), found.typetag_name());
+                    let (name, found) = (self.factor_type(), found.typetag_name());
                     let message = format!(
                         "`{name}` takes a variable of type `{expected}` here, `{key}` is of type `{found}`"
                     );
@@ -142,7 +145,7 @@ impl RuleFactor {
     /// If the factor needs the up direction and it is unknown.
     pub fn instantiate(&self, up: Option<Direction>) -> Result<Arc<dyn Factor>, RuleError> {
         match (up, self.wants_up()) {
-            (None, true) => Err(RuleError::NoUp { factor: self.name().to_owned() }),
+            (None, true) => Err(RuleError::NoUp { factor: self.factor_type().to_owned() }),
             (Some(up), true) => Ok(self.factor.with_up(up).map_or_else(|| self.factor.clone(), Arc::from)),
             (_, false) => Ok(self.factor.clone()),
         }

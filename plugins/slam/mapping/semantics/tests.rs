@@ -1,4 +1,4 @@
-use super::apply::Verdict;
+use super::apply::RuleVerdict;
 use super::*;
 use manifactor_config::{Document, Errors, Format};
 use manifactor_geometry::{Se3, So3};
@@ -6,10 +6,10 @@ use manifactor_quadric::DualQuadric;
 use nalgebra::Vector3;
 
 fn orientation(class: &str) -> Vec<String> {
-    let aliases = Aliases::default();
+    let aliases = ClassAliases::default();
     let class = aliases.canonical(class);
     let rules = table_one().unwrap();
-    rules.iter().filter(|r| r.applies(&class, &aliases)).map(|r| r.factor.name().to_owned()).collect()
+    rules.iter().filter(|r| r.applies(&class, &aliases)).map(|r| r.factor.factor_type().to_owned()).collect()
 }
 
 #[test]
@@ -23,16 +23,18 @@ fn table_one_has_the_classes_of_the_paper() {
 
 #[test]
 fn a_star_is_for_all() {
-    let rule = Rule { classes: vec!["*".into()], ..table_one().unwrap().swap_remove(0) };
-    assert!(rule.applies("sports ball", &Aliases::default()) && rule.applies("", &Aliases::default()));
-    assert_eq!(unmatched(&rule, &[], &Aliases::default()), [""; 0]);
+    let rule = SemanticRule { classes: vec!["*".into()], ..table_one().unwrap().swap_remove(0) };
+    assert!(
+        rule.applies("sports ball", &ClassAliases::default()) && rule.applies("", &ClassAliases::default())
+    );
+    assert_eq!(unmatched(&rule, &[], &ClassAliases::default()), [""; 0]);
 }
 
 #[test]
 fn classes_that_match_nothing_are_told() {
     let rules = table_one().unwrap();
     let seen = vec!["cup".to_owned(), "potted plant".to_owned()];
-    let missing = unmatched(&rules[1], &seen, &Aliases::default());
+    let missing = unmatched(&rules[1], &seen, &ClassAliases::default());
     assert_eq!(missing.len(), 7);
     assert!(!missing.contains(&"cup"));
 }
@@ -48,7 +50,7 @@ fn the_factor_gets_up_from_gravity() {
 }
 
 /// Returns the rules of a document, or its errors.
-fn read(text: &str) -> Result<Vec<Rule>, String> {
+fn read(text: &str) -> Result<Vec<SemanticRule>, String> {
     let document = Document::parse("rules.toml", text, Format::Toml).unwrap();
     let errors = Errors::new();
     let read = document.section(&errors).map(|mut section| {
@@ -61,26 +63,27 @@ fn read(text: &str) -> Result<Vec<Rule>, String> {
 const TABLE: &str =
     "variables = [{ key = 'table', value = { type = 'plane', normal = [0.0, 0.0, 1.0], offset = 0.7 } }]\n";
 
-fn rules(semantics: &str) -> Result<Vec<Rule>, String> {
+fn rules(semantics: &str) -> Result<Vec<SemanticRule>, String> {
     read(&format!("{TABLE}[[semantics]]\n{semantics}"))
 }
 
 /// Returns an object on a line, half a metre long; its width equals its height.
-fn object(number: usize, class: &str, score: f64, x: f64) -> Candidate {
+fn object(number: usize, class: &str, score: f64, x: f64) -> RuleCandidate {
     let pose = Se3::new(So3::identity(), Vector3::new(x, 0.0, 0.1 * number as f64));
     let class = FusedClass { name: class.into(), score, share: 1.0, others: Default::default() };
     let start = DualQuadric { pose, semi_axes: Vector3::new(0.1, 0.1, 0.25) };
-    Candidate { key: Key::indexed("q", number), class: Some(class), start, known: false }
+    RuleCandidate { key: Key::indexed("q", number), class: Some(class), start, known: false }
 }
 
 /// Returns the verdict on each of these objects.
-fn judged(semantics: &str, objects: &[Candidate]) -> Vec<Verdict> {
-    let (rules, aliases) = (rules(semantics).unwrap_or_else(|e| panic!("{e}")), Aliases::default());
-    let mut judge = Judge::new(&rules, &aliases, Some(Direction::Z), objects.to_vec(), Connected::default());
-    objects.iter().map(|object| judge.judge(object).unwrap()).collect()
+fn judged(semantics: &str, objects: &[RuleCandidate]) -> Vec<RuleVerdict> {
+    let (rules, aliases) = (rules(semantics).unwrap_or_else(|e| panic!("{e}")), ClassAliases::default());
+    let mut judge =
+        RuleEvaluator::new(&rules, &aliases, Some(Direction::Z), objects.to_vec(), ConnectedKeys::default());
+    objects.iter().map(|object| judge.evaluate_object(object).unwrap()).collect()
 }
 
-fn keys(verdict: &Verdict) -> Vec<Vec<&str>> {
+fn keys(verdict: &RuleVerdict) -> Vec<Vec<&str>> {
     verdict.entries.iter().map(|entry| entry.keys.iter().map(Key::as_str).collect()).collect()
 }
 

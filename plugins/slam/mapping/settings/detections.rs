@@ -28,7 +28,7 @@ pub struct DetectionSettings {
     pub min_score: Share,
     /// Standard deviation of measured depths as a fraction of the depth, if the source has depths. Default:
     /// 0.03.
-    #[serde(skip_serializing_if = "is_usual")]
+    #[serde(skip_serializing_if = "is_default_depth_error")]
     pub depth_error: Positive,
 }
 
@@ -57,12 +57,12 @@ impl CutSides {
 }
 
 /// Default standard deviation of depths, as a fraction of the depth.
-const DEPTH_ERROR: Positive = Positive::literal(0.03);
+const DEFAULT_DEPTH_ERROR: Positive = Positive::literal(0.03);
 
 /// The default is not written, because sources without depths have this setting as well.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
-fn is_usual(depth_error: &Positive) -> bool {
-    *depth_error == DEPTH_ERROR
+fn is_default_depth_error(depth_error: &Positive) -> bool {
+    *depth_error == DEFAULT_DEPTH_ERROR
 }
 
 /// Rows of a box residual.
@@ -87,7 +87,7 @@ impl Default for DetectionSettings {
             cut_sides: CutSides::Drop,
             border_px: NotNegative::literal(20.0),
             min_score: Share::literal(0.0),
-            depth_error: DEPTH_ERROR,
+            depth_error: DEFAULT_DEPTH_ERROR,
         }
     }
 }

@@ -20,7 +20,7 @@ pub enum Holdout {
 }
 
 /// The last of this many consecutive blocks is held out.
-const BLOCKS: usize = 5;
+const BLOCKS_PER_HOLDOUT: usize = 5;
 /// Seed of the random draw.
 const SEED: u64 = 1;
 
@@ -32,7 +32,9 @@ impl Holdout {
         let mut is_held_out = |detection: &Detection| match self {
             Self::Share(share) => rng.random_bool(*share),
             Self::Last(share) => detection.frame as f64 >= (1.0 - *share) * frames as f64,
-            Self::Block(length) => detection.frame / length.get() % BLOCKS == BLOCKS - 1,
+            Self::Block(length) => {
+                detection.frame / length.get() % BLOCKS_PER_HOLDOUT == BLOCKS_PER_HOLDOUT - 1
+            }
         };
         let all = std::mem::take(&mut sequence.detections);
         let (held_out, used) = all.into_iter().partition(|detection| is_held_out(detection));
@@ -44,11 +46,11 @@ impl Holdout {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use manifactor_simulator::Simulated;
+    use manifactor_simulator::SimulatedSource;
 
     #[test]
     fn boxes_are_held_out_as_it_says_and_none_is_lost() {
-        let whole = Simulated::default().simulate().unwrap();
+        let whole = SimulatedSource::default().simulate().unwrap();
         let (boxes, frames) = (whole.detections.len(), whole.frames.len());
         let split = |holdout: Holdout| {
             let mut rest = whole.clone();

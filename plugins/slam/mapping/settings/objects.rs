@@ -1,5 +1,5 @@
 use manifactor_graph::checked::NotNegative;
-use manifactor_quadric::initialise::{Initialiser, Svd};
+use manifactor_quadric::initialise::{Initialiser, SvdInitialiser};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -39,7 +39,7 @@ impl Default for ObjectSettings {
             max_box_deviation_px: NotNegative::literal(50.0),
             min_parallax_deg: Degrees::literal(0.0),
             birth_parallax_deg: Degrees::literal(10.0),
-            initialiser: Arc::new(Svd::default()),
+            initialiser: Arc::new(SvdInitialiser::default()),
             refinements: 5,
         }
     }

@@ -1,5 +1,6 @@
 use manifactor_config::{Fault, Section, read_graph_section};
 use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Values, Variable};
+use manifactor_recording::keys::key_number;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
@@ -14,7 +15,7 @@ pub struct OwnGraph {
 }
 
 impl OwnGraph {
-    pub(super) fn take(section: &mut Section<'_>) -> Self {
+    pub(super) fn read_section(section: &mut Section<'_>) -> Self {
         if !section.has("variables") && !section.has("factors") {
             // still registers both names, so that an error about a misspelt field can suggest them
             let _ = (section.optional_node("variables"), section.optional_node("factors"));
@@ -30,11 +31,11 @@ impl OwnGraph {
     }
 
     /// Returns the variables whose key is one of these prefixes and a number, each with its prefix.
-    pub(super) fn numbered(
+    pub(super) fn numbered_variables(
         &self,
         prefixes: &'static [&'static str],
     ) -> impl Iterator<Item = (&Key, &'static str)> {
-        let prefix = |key: &Key| prefixes.iter().copied().find(|prefix| is_numbered(key.as_str(), prefix));
+        let prefix = |key: &Key| prefixes.iter().copied().find(|prefix| key_number(key, prefix).is_some());
         self.values.iter().filter_map(move |(key, _)| Some((key, prefix(key)?)))
     }
 
@@ -50,21 +51,15 @@ impl OwnGraph {
     }
 }
 
-/// Returns whether a key is a prefix and a number.
-fn is_numbered(key: &str, prefix: &str) -> bool {
-    let number = key.strip_prefix(prefix).unwrap_or_default();
-    !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit())
-}
-
 fn is_of_the_map(key: &Key) -> bool {
-    ["x", "q"].iter().any(|prefix| is_numbered(key.as_str(), prefix))
+    ["x", "q"].iter().any(|prefix| key_number(key, prefix).is_some())
 }
 
 /// Writes the form of a document; empty lists are left out.
 impl Serialize for OwnGraph {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
-        struct Written<'a> {
+        struct WrittenEntry<'a> {
             key: &'a str,
             value: &'a dyn Variable,
             #[serde(skip_serializing_if = "Option::is_none")]
@@ -73,7 +68,7 @@ impl Serialize for OwnGraph {
         let mut map = serializer.serialize_map(None)?;
         if !self.values.is_empty() {
             let fixed = self.graph.fixed();
-            let written = self.values.iter().map(|(key, value)| Written {
+            let written = self.values.iter().map(|(key, value)| WrittenEntry {
                 key: key.as_str(),
                 value,
                 fixed: fixed.get(key),

@@ -4,7 +4,7 @@ use manifactor_geometry::Se3;
 use manifactor_graph::checked::{NotNegative, Positive};
 use manifactor_graph::loss::{Cauchy, Loss};
 use manifactor_graph::{Direction, Noise};
-use manifactor_recording::class::Aliases;
+use manifactor_recording::class::ClassAliases;
 use manifactor_recording::prior_map::{PriorMap, PriorObject};
 use manifactor_recording::sequence::Frame;
 use schemars::JsonSchema;
@@ -60,7 +60,7 @@ fn loss() -> Arc<dyn Loss> {
 
 /// A map, and the pose of the first camera in it.
 #[derive(Debug, Clone, Copy)]
-pub struct Anchor<'a> {
+pub struct MapAnchor<'a> {
     /// The map of an earlier run.
     pub map: &'a PriorMap,
     /// Pose of the first camera in it, map from camera.
@@ -72,7 +72,7 @@ impl PriorMapSettings {
     pub(super) fn read(
         &mut self,
         folder: &Path,
-        aliases: &Aliases,
+        aliases: &ClassAliases,
         settings: &Node,
         errors: &Errors,
     ) -> Option<()> {
@@ -94,27 +94,27 @@ impl PriorMapSettings {
     }
 
     /// Returns the map and the start in it, if the start is known.
-    pub(super) fn anchor(&self) -> Option<Anchor<'_>> {
-        Some(Anchor { map: &self.map, start: self.start? })
+    pub(super) fn anchor(&self) -> Option<MapAnchor<'_>> {
+        Some(MapAnchor { map: &self.map, start: self.start? })
     }
 
     /// Returns an object of the map with its covariance enlarged by `sigma_scale` and `shape_error`. Maps are
     /// written with the covariance that was read, because each reader applies its own settings.
-    pub fn trusted(&self, object: &PriorObject) -> PriorObject {
-        object.trusted(*self.sigma_scale, *self.shape_error)
+    pub fn inflated_object(&self, object: &PriorObject) -> PriorObject {
+        object.inflated(*self.sigma_scale, *self.shape_error)
     }
 
     /// Returns the map with the enlarged covariances of all objects.
-    pub fn trusted_map(&self) -> PriorMap {
-        let objects = self.map.objects.iter().map(|object| Arc::new(self.trusted(object)));
+    pub fn inflated_map(&self) -> PriorMap {
+        let objects = self.map.objects.iter().map(|object| Arc::new(self.inflated_object(object)));
         PriorMap::new(self.map.up, objects.collect())
     }
 }
 
-impl Anchor<'_> {
+impl MapAnchor<'_> {
     /// Returns the frame of the map, for an odometry that begins with the frame `first`. The up direction
     /// comes from the map, or from `located` if the map has none.
-    pub fn frame(&self, first: &Frame, located: MapFrame) -> MapFrame {
+    pub fn map_frame(&self, first: &Frame, located: MapFrame) -> MapFrame {
         let map_from_odometry = self.start.compose(&first.world_from_camera.inverse());
         let moved = map_from_odometry.compose(&located.map_from_odometry.inverse());
         let up =
@@ -123,9 +123,9 @@ impl Anchor<'_> {
     }
 }
 
-impl super::Settings {
+impl super::RunSettings {
     /// Returns the prior map and the start in it, if the start is known.
-    pub fn anchor(&self) -> Option<Anchor<'_>> {
+    pub fn anchor(&self) -> Option<MapAnchor<'_>> {
         self.prior_map.as_ref().and_then(PriorMapSettings::anchor)
     }
 
@@ -135,7 +135,7 @@ impl super::Settings {
     }
 
     /// Returns these settings with a start that relocalization found, and its noise.
-    pub fn beginning_at(&self, start: Se3, noise: Noise) -> Self {
+    pub fn with_start(&self, start: Se3, noise: Noise) -> Self {
         let mut settings = self.clone();
         if let Some(prior) = &mut settings.prior_map {
             prior.start = Some(start);

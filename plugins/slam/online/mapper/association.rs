@@ -1,15 +1,15 @@
 //! Online data association, with corrections of earlier frames.
 use super::Mapper;
 use super::frame::FrameReport;
-use super::object::{Sights, Tracked};
-use super::revision::Before;
-use manifactor_association::{Learned, Map, Merge, Move, Names};
+use super::object::{ObjectState, ViewingDirections};
+use super::revision::MapSnapshot;
+use manifactor_association::{Corrections, DetectionMove, MapEstimate, ObjectIdChanges, ObjectMerge};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Key, Values};
 use manifactor_mapping::mapping::measurements::{Measurements, ObjectBox};
 use manifactor_mapping::mapping::{object_key, pose_key};
-use manifactor_mapping::settings::Settings;
+use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::DualQuadric;
 use manifactor_recording::sequence::ObjectId;
 use manifactor_smoother::{FactorId, Smoother};
@@ -17,105 +17,118 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Share of the boxes of an object that may change at once. Beyond it, the object is removed and initialized
 /// again.
-const OTHERS: f64 = 0.25;
+const MAX_MOVED_SHARE: f64 = 0.25;
 
 /// The current estimate for data association. Poses outside of the window are those at the time of their
 /// frames.
-pub(super) struct Known<'a> {
+pub(super) struct AssociationContext<'a> {
     /// Index and pose of the last frame.
     pub newest: (usize, Se3),
-    pub live: &'a [StampedPose],
-    pub session: &'a Smoother,
+    pub live_poses: &'a [StampedPose],
+    pub smoother: &'a Smoother,
     pub measurements: &'a Measurements,
 }
 
-impl Map for Known<'_> {
+impl MapEstimate for AssociationContext<'_> {
     fn pose(&self, frame: usize) -> Option<Se3> {
         let (newest, pose) = self.newest;
         if frame == newest {
             return Some(pose);
         }
-        let now = self.session.get(pose_key(frame).as_str()).ok();
-        now.or_else(|| self.live.get(frame).map(|live| live.pose))
+        let now = self.smoother.get(pose_key(frame).as_str()).ok();
+        now.or_else(|| self.live_poses.get(frame).map(|live| live.pose))
     }
 
     fn object(&self, id: ObjectId) -> Option<DualQuadric> {
-        let now = self.session.get(object_key(id).as_str()).ok();
+        let now = self.smoother.get(object_key(id).as_str()).ok();
         // the first frame is assigned before the smoother has the objects of the prior map
         now.or_else(|| Some(self.measurements.object(id)?.prior.as_ref()?.quadric))
     }
 }
 
 /// A correction, with the state before it.
-pub(super) struct Corrected {
+pub(super) struct AppliedCorrections {
     /// Object ids after the correction.
-    pub names: Names,
-    learned: Vec<Learned>,
-    before: Before,
+    pub id_changes: ObjectIdChanges,
+    corrections: Vec<Corrections>,
+    before: MapSnapshot,
     measurements: Measurements,
 }
 
 impl Mapper {
     /// Returns the current estimate, with the newest frame and its pose.
-    pub(super) fn known(&self, newest: (usize, Se3)) -> Known<'_> {
-        Known { newest, live: &self.live, session: &self.session, measurements: &self.measurements }
+    pub(super) fn association_context(&self, newest: (usize, Se3)) -> AssociationContext<'_> {
+        AssociationContext {
+            newest,
+            live_poses: &self.live_poses,
+            smoother: &self.smoother,
+            measurements: &self.measurements,
+        }
     }
 
     /// Pushes pending corrections of earlier frames to the smoother, for the next update. If the update
-    /// fails, the returned correction has to be [undone](Self::undo).
-    pub(super) fn correct(&mut self, report: &mut FrameReport) -> Option<Corrected> {
+    /// fails, the returned correction has to be [undone](Self::undo_corrections).
+    pub(super) fn apply_pending_corrections(
+        &mut self,
+        report: &mut FrameReport,
+    ) -> Option<AppliedCorrections> {
         let learned = std::mem::take(&mut self.pending);
         if learned.is_empty() {
             return None;
         }
-        let before = self.before();
+        let before = self.take_snapshot();
         let measurements = self.measurements.clone();
-        let (mut names, mut owners) = (self.names.clone(), vec![]);
+        let (mut names, mut owners) = (self.id_changes.clone(), vec![]);
         for learned in &learned {
             for moved in &learned.moved {
-                self.put(moved);
-                names.put(moved);
+                self.move_detection(moved);
+                names.record_move(moved);
             }
             report.moved.extend_from_slice(&learned.moved);
-            owners.extend(self.put_right(&learned.moved, report));
+            owners.extend(self.update_moved_boxes(&learned.moved, report));
             for merge in &learned.merged {
-                owners.extend(self.unite(*merge, report));
-                names.merge(*merge);
+                owners.extend(self.merge_objects(*merge, report));
+                names.record_merge(*merge);
             }
-            learned.forgotten.iter().for_each(|id| self.forget(*id));
+            learned.forgotten.iter().for_each(|id| self.forget_tentative_object(*id));
         }
-        let owners: BTreeSet<ObjectId> = owners.into_iter().map(|id| names.now(id)).collect();
-        self.ask(&owners.into_iter().collect::<Vec<_>>(), report);
-        Some(Corrected { names, learned, before, measurements })
+        let owners: BTreeSet<ObjectId> = owners.into_iter().map(|id| names.current_id(id)).collect();
+        self.apply_rules(&owners.into_iter().collect::<Vec<_>>(), report);
+        Some(AppliedCorrections { id_changes: names, corrections: learned, before, measurements })
     }
 
     /// Restores the state before a failed correction. The correction is tried again with the next frame.
-    pub(super) fn undo(&mut self, corrected: Corrected, why: &str, report: &mut FrameReport) {
+    pub(super) fn undo_corrections(
+        &mut self,
+        corrected: AppliedCorrections,
+        why: &str,
+        report: &mut FrameReport,
+    ) {
         let moved = report.moved.drain(..).map(|moved| moved.from);
         let gone = moved.chain(report.merged.drain(..).map(|merge| merge.from)).map(object_key);
-        let keys: BTreeSet<Key> = gone.chain(report.withdrawn.drain(..)).collect();
+        let keys: BTreeSet<Key> = gone.chain(report.removed.drain(..)).collect();
         let keys: Vec<&str> = keys.iter().map(Key::as_str).collect();
         report.refused.push(format!("changes of {}: {why}", keys.join(", ")));
-        self.restore(corrected.before);
+        self.restore_snapshot(corrected.before);
         self.measurements = corrected.measurements;
-        self.pending = corrected.learned;
+        self.pending = corrected.corrections;
     }
 
     /// Moves a detection to a different object in the measurements.
-    fn put(&mut self, Move { from, detection, .. }: &Move) {
-        let Settings { detections, aliases, .. } = &*self.settings;
-        self.measurements.take_back(detection, *from, &self.camera, detections, aliases);
-        self.measurements.add(detection, &self.camera, detections, aliases);
-        if let Some(object @ Tracked::Withdrawn) = self.objects.get_mut(from) {
+    fn move_detection(&mut self, DetectionMove { from, detection, .. }: &DetectionMove) {
+        let RunSettings { detections, aliases, .. } = &*self.settings;
+        self.measurements.remove_detection(detection, *from, &self.camera, detections, aliases);
+        self.measurements.add_detection(detection, &self.camera, detections, aliases);
+        if let Some(object @ ObjectState::Removed) = self.objects.get_mut(from) {
             // without this detection it may be one object
-            *object = Tracked::default();
+            *object = ObjectState::default();
         }
     }
 
     /// Updates the factors of objects whose boxes have moved. If a large share of the boxes of an object
     /// changed at once, its estimate belongs to a different object: it is removed from the map until its next
     /// detection. Returns the objects that semantic rules connected with removed ones.
-    fn put_right(&mut self, all: &[Move], report: &mut FrameReport) -> Vec<ObjectId> {
+    fn update_moved_boxes(&mut self, all: &[DetectionMove], report: &mut FrameReport) -> Vec<ObjectId> {
         let mut changed: BTreeMap<ObjectId, BTreeSet<usize>> = BTreeMap::new();
         for (id, frame) in all.iter().flat_map(|moved| [(moved.from, moved.frame), (moved.into, moved.frame)])
         {
@@ -124,26 +137,27 @@ impl Mapper {
         let mut owners = vec![];
         for (id, frames) in changed {
             let others = self.measured(id).filter(|measured| measured.prior.is_none());
-            let is_other = others.is_some_and(|own| frames.len() as f64 > OTHERS * own.views.len() as f64);
-            let is_begun_again = is_other && self.leaves_nothing(id);
+            let is_other =
+                others.is_some_and(|own| frames.len() as f64 > MAX_MOVED_SHARE * own.views.len() as f64);
+            let is_begun_again = is_other && self.is_removable(id);
             match self.objects.entry(id).or_default() {
-                Tracked::Mapped(_) if is_begun_again => {
-                    owners.extend(self.take_out(id, report));
-                    self.objects.insert(id, Tracked::Waiting(self.sights(id)));
-                    report.withdrawn.push(object_key(id));
+                ObjectState::Mapped(_) if is_begun_again => {
+                    owners.extend(self.remove_object(id, report));
+                    self.objects.insert(id, ObjectState::Tentative(self.viewing_directions(id)));
+                    report.removed.push(object_key(id));
                 }
-                Tracked::Mapped(mapped) => {
+                ObjectState::Mapped(mapped) => {
                     let gone = mapped.boxes.extract_if(.., |(of, _)| frames.contains(of));
                     let gone: Vec<FactorId> = gone.map(|(_, factor)| factor).collect();
-                    self.remove(&gone, report);
+                    self.remove_factors(&gone, report);
                     let view = |frame: &usize| self.measured(id)?.view(*frame).cloned();
                     let views: Vec<ObjectBox> = frames.iter().filter_map(view).collect();
                     self.push_boxes(id, &views, report);
                 }
-                Tracked::Waiting(_) => {
-                    self.objects.insert(id, Tracked::Waiting(self.sights(id)));
+                ObjectState::Tentative(_) => {
+                    self.objects.insert(id, ObjectState::Tentative(self.viewing_directions(id)));
                 }
-                Tracked::Withdrawn => {}
+                ObjectState::Removed => {}
             }
         }
         owners
@@ -151,14 +165,14 @@ impl Mapper {
 
     /// Returns whether an object can be removed without a trace, so that it can come back: none of the poses
     /// with its boxes has left the window.
-    pub(super) fn leaves_nothing(&self, id: ObjectId) -> bool {
-        let Some(Tracked::Mapped(mapped)) = self.objects.get(&id) else { return true };
-        mapped.boxes.iter().all(|(_, factor)| self.session.entry(*factor).is_some())
+    pub(super) fn is_removable(&self, id: ObjectId) -> bool {
+        let Some(ObjectState::Mapped(mapped)) = self.objects.get(&id) else { return true };
+        mapped.boxes.iter().all(|(_, factor)| self.smoother.entry(*factor).is_some())
     }
 
     /// Returns the viewing directions of an object outside of the map.
-    pub(super) fn sights(&self, id: ObjectId) -> Sights {
-        let mut sights = Sights::new();
+    pub(super) fn viewing_directions(&self, id: ObjectId) -> ViewingDirections {
+        let mut sights = ViewingDirections::new();
         for view in self.measured(id).map_or(&[][..], |measured| &measured.views) {
             if let Some(pose) = self.pose(view.frame) {
                 sights.add(view, &pose, &self.camera);
@@ -168,36 +182,36 @@ impl Mapper {
     }
 
     /// Removes an object that is not in the map. Its boxes become unassociated.
-    pub(super) fn forget(&mut self, id: ObjectId) {
-        if !self.objects.get(&id).is_some_and(Tracked::is_mapped) {
+    pub(super) fn forget_tentative_object(&mut self, id: ObjectId) {
+        if !self.objects.get(&id).is_some_and(ObjectState::is_mapped) {
             self.objects.remove(&id);
-            self.measurements.disown(id);
+            self.measurements.remove_object(id);
         }
     }
 
     /// Merges an object into a second one: adds its boxes to the map if the second one is there, else to its
     /// tentative track. Returns the objects that semantic rules connected with the removed one.
-    fn unite(&mut self, merge: Merge, report: &mut FrameReport) -> Vec<ObjectId> {
-        let Merge { from, into } = merge;
-        let is_mapped = self.objects.get(&from).is_some_and(Tracked::is_mapped);
-        let owners = if is_mapped { self.take_out(from, report) } else { vec![] };
+    fn merge_objects(&mut self, merge: ObjectMerge, report: &mut FrameReport) -> Vec<ObjectId> {
+        let ObjectMerge { from, into } = merge;
+        let is_mapped = self.objects.get(&from).is_some_and(ObjectState::is_mapped);
+        let owners = if is_mapped { self.remove_object(from, report) } else { vec![] };
         self.objects.remove(&from);
-        let mut new = self.measurements.merge(from, into);
-        if matches!(self.objects.get(&into), Some(Tracked::Withdrawn)) {
+        let mut new = self.measurements.merge_objects(from, into);
+        if matches!(self.objects.get(&into), Some(ObjectState::Removed)) {
             // with these boxes the object may be valid
             self.objects.remove(&into);
             new = self.measured(into).map_or(new, |measured| measured.views.clone());
         }
         match self.objects.entry(into).or_default() {
-            Tracked::Mapped(_) => self.push_boxes(into, &new, report),
-            Tracked::Waiting(sights) => {
+            ObjectState::Mapped(_) => self.push_boxes(into, &new, report),
+            ObjectState::Tentative(sights) => {
                 for view in &new {
-                    if let Ok(pose) = self.session.get(pose_key(view.frame).as_str()) {
+                    if let Ok(pose) = self.smoother.get(pose_key(view.frame).as_str()) {
                         sights.add(view, &pose, &self.camera);
                     }
                 }
             }
-            Tracked::Withdrawn => {}
+            ObjectState::Removed => {}
         }
         tracing::info!(object = %from, "is object {into}");
         report.merged.push(merge);
@@ -209,8 +223,8 @@ impl Mapper {
         let (frames, entries) = self.entries_of(&object_key(id), views);
         let mut graph = Graph::new();
         graph.factors_mut().extend(entries);
-        match (self.session.push(&graph, &Values::new()), self.objects.get_mut(&id)) {
-            (Ok(ids), Some(Tracked::Mapped(mapped))) => mapped.boxes.extend(frames.into_iter().zip(ids)),
+        match (self.smoother.push(&graph, &Values::new()), self.objects.get_mut(&id)) {
+            (Ok(ids), Some(ObjectState::Mapped(mapped))) => mapped.boxes.extend(frames.into_iter().zip(ids)),
             (Ok(_), _) => {}
             (Err(error), _) => report.refused.push(error.to_string()),
         }

@@ -1,15 +1,17 @@
 //! Processing of one frame: its pose and boxes, then the changes in the map.
-use super::association::{Corrected, Known};
-use super::object::Tracked;
-use super::{FrameError, Located, Mapper};
-use manifactor_association::{Image, Learned, Merge, Move};
+use super::association::{AppliedCorrections, AssociationContext};
+use super::object::ObjectState;
+use super::{FrameError, Mapper, Relocalization};
+use manifactor_association::{Corrections, DetectionMove, FrameDetections, ObjectMerge};
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, Graph, Key, Manifold, Values};
 use manifactor_mapping::gravity::MapFrame;
-use manifactor_mapping::mapping::measurements::{ObjectBox, Sifted, sift};
-use manifactor_mapping::mapping::{known_entry, object_key, pose_key, prior_entry, step, view_entries};
+use manifactor_mapping::mapping::measurements::{FilteredDetection, ObjectBox, filter_detection};
+use manifactor_mapping::mapping::{
+    motion_step, object_key, pose_key, prior_entry, prior_object_entry, view_entries,
+};
 use manifactor_mapping::semantics::RuleError;
-use manifactor_mapping::settings::Settings;
+use manifactor_mapping::settings::RunSettings;
 use manifactor_recording::sequence::{Detection, Frame, ObjectId, Observation, UnusedDetection};
 use manifactor_smoother::{ChangeError, FactorId, UpdateReport};
 use serde::Serialize;
@@ -28,25 +30,28 @@ pub struct FrameReport {
     /// prior map. All frames were processed again, so objects, rejections and updates in this report cover
     /// all frames. Earlier reports refer to a map that was discarded.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub located: Option<Located>,
+    pub located: Option<Relocalization>,
     /// Number of boxes that passed the filters.
     pub boxes: usize,
     /// Object of each box, in the order of the frame; `None` for skipped boxes.
-    pub names: Vec<Option<ObjectId>>,
+    #[serde(rename = "names")]
+    pub box_objects: Vec<Option<ObjectId>>,
     /// Objects that were detected too rarely. Their boxes have no object.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub forgotten: Vec<ObjectId>,
     /// Boxes of earlier frames that moved to a different object, before the boxes of this frame were
     /// assigned.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub moved: Vec<Move>,
+    pub moved: Vec<DetectionMove>,
     /// Objects that were merged, after the moves and before the boxes of this frame were assigned.
-    pub merged: Vec<Merge>,
+    pub merged: Vec<ObjectMerge>,
     /// Objects added to the map.
-    pub born: Vec<Key>,
+    #[serde(rename = "born")]
+    pub initialized: Vec<Key>,
     /// Objects removed from the map: their boxes belong to several objects, are too few, or changed. They may
     /// be initialized again.
-    pub withdrawn: Vec<Key>,
+    #[serde(rename = "withdrawn")]
+    pub removed: Vec<Key>,
     /// Objects whose class changed, so that the semantic rules were applied again.
     pub revised: Vec<Key>,
     /// Rejected data, with the reasons.
@@ -58,19 +63,19 @@ pub struct FrameReport {
 }
 
 /// The content of a frame after its pose is added.
-pub(super) struct Seen {
+pub(super) struct FrameBoxes {
     /// Boxes that passed the filters, by object.
     pub boxes: BTreeMap<ObjectId, ObjectBox>,
     /// Corrections to earlier frames.
-    pub learned: Learned,
+    pub corrections: Corrections,
     /// True if the up direction changed.
     pub up_moved: bool,
 }
 
-impl Seen {
+impl FrameBoxes {
     /// Returns a frame without boxes.
-    pub(super) fn nothing() -> Self {
-        Self { boxes: BTreeMap::new(), learned: Learned::default(), up_moved: false }
+    pub(super) fn without_boxes() -> Self {
+        Self { boxes: BTreeMap::new(), corrections: Corrections::default(), up_moved: false }
     }
 }
 
@@ -82,12 +87,12 @@ impl FrameReport {
             pose: Se3::identity(),
             located: None,
             boxes: 0,
-            names: vec![],
+            box_objects: vec![],
             forgotten: vec![],
             moved: vec![],
             merged: vec![],
-            born: vec![],
-            withdrawn: vec![],
+            initialized: vec![],
+            removed: vec![],
             revised: vec![],
             refused: vec![],
             updates: vec![],
@@ -95,44 +100,44 @@ impl FrameReport {
     }
 
     /// Adds the changes of an earlier frame to the report.
-    pub fn tell_after(&mut self, before: Self) {
-        fn put<T>(mut first: Vec<T>, last: &mut Vec<T>) {
+    pub fn prepend_changes(&mut self, before: Self) {
+        fn prepend<T>(mut first: Vec<T>, last: &mut Vec<T>) {
             first.append(last);
             *last = first;
         }
-        put(before.forgotten, &mut self.forgotten);
-        put(before.moved, &mut self.moved);
-        put(before.merged, &mut self.merged);
-        put(before.born, &mut self.born);
-        put(before.withdrawn, &mut self.withdrawn);
-        put(before.revised, &mut self.revised);
-        put(before.refused, &mut self.refused);
+        prepend(before.forgotten, &mut self.forgotten);
+        prepend(before.moved, &mut self.moved);
+        prepend(before.merged, &mut self.merged);
+        prepend(before.initialized, &mut self.initialized);
+        prepend(before.removed, &mut self.removed);
+        prepend(before.revised, &mut self.revised);
+        prepend(before.refused, &mut self.refused);
         let is_told = |update: &UpdateReport| {
             update.solved_batch || !(update.rejected.is_empty() && update.readmitted.is_empty())
         };
-        put(before.updates.into_iter().filter(is_told).collect(), &mut self.updates);
+        prepend(before.updates.into_iter().filter(is_told).collect(), &mut self.updates);
     }
 }
 
 impl Mapper {
     /// Adds a pose in one smoother update, together with boxes of mapped objects and corrections of earlier
     /// frames. If the update fails, tries again without the corrections, then with the pose alone.
-    pub(super) fn take_pose(
+    pub(super) fn add_pose(
         &mut self,
         observation: &Observation,
         report: &mut FrameReport,
-    ) -> Result<Seen, FrameError> {
+    ) -> Result<FrameBoxes, FrameError> {
         let frame = &observation.frame;
         let timestamp = frame.timestamp;
         if !(timestamp.is_finite() && frame.world_from_camera.is_finite()) {
             return Err(FrameError::NotFinite { timestamp });
         }
         if let Some(before) = self.last.as_ref().map(|last| last.timestamp).filter(|t| *t >= timestamp) {
-            return Err(FrameError::Time { timestamp, before });
+            return Err(FrameError::Timestamp { timestamp, before });
         }
-        let up = self.up.unsettled();
-        let up_moved = self.up.look(observation, &self.settings)?;
-        let taken = self.take_located(observation, up_moved, report);
+        let up = self.up.backup_unless_final();
+        let up_moved = self.up.add_frame(observation, &self.settings)?;
+        let taken = self.add_pose_with_up(observation, up_moved, report);
         if taken.is_err()
             && let Some(up) = up
         {
@@ -142,14 +147,14 @@ impl Mapper {
     }
 
     /// Adds a frame, with the up direction already updated.
-    fn take_located(
+    fn add_pose_with_up(
         &mut self,
         observation: &Observation,
         up_moved: bool,
         report: &mut FrameReport,
-    ) -> Result<Seen, FrameError> {
+    ) -> Result<FrameBoxes, FrameError> {
         let (frame, timestamp) = (&observation.frame, observation.frame.timestamp);
-        let (graph, values) = self.tied(frame, report)?;
+        let (graph, values) = self.pose_with_factors(frame, report)?;
         // a rejected frame must not leave pending changes in the smoother
         if !report.pose.is_finite() {
             return Err(FrameError::NotFinite { timestamp });
@@ -158,47 +163,52 @@ impl Mapper {
             UnusedDetection::Box { place, fault, .. } => Some(format!("box {place} is left out: {fault}")),
             UnusedDetection::WithoutPose(_) => None,
         }));
-        self.session.set_time(timestamp)?;
-        self.session.push(&graph, &values)?;
-        let corrected = self.correct(report);
+        self.smoother.set_time(timestamp)?;
+        self.smoother.push(&graph, &values)?;
+        let corrected = self.apply_pending_corrections(report);
         let detections = &observation.detections;
-        let image = Image { frame: report.frame, timestamp, detections };
-        let predicted = self.known((report.frame, report.pose));
-        report.names = self.associator.associate(&image, &predicted);
-        let named = report.names.iter().zip(detections);
+        let image = FrameDetections { frame: report.frame, timestamp, detections };
+        let predicted = self.association_context((report.frame, report.pose));
+        report.box_objects = self.associator.associate(&image, &predicted);
+        let named = report.box_objects.iter().zip(detections);
         let named = named.map(|(object, d)| Detection { frame: report.frame, object: *object, ..d.clone() });
         let named: Vec<Detection> = named.collect();
-        let mut seen = Seen { boxes: self.boxes(&named), learned: Learned::default(), up_moved };
+        let mut seen =
+            FrameBoxes { boxes: self.boxes_by_object(&named), corrections: Corrections::default(), up_moved };
         report.boxes = seen.boxes.len();
-        let is_taken = self.update_with(&seen.boxes, corrected, (&graph, &values), report)?;
+        let is_taken = self.update_smoother(&seen.boxes, corrected, (&graph, &values), report)?;
         self.last = Some(frame.clone());
         if is_taken {
             for detection in &named {
-                let Settings { detections, aliases, .. } = &*self.settings;
-                self.measurements.add(detection, &self.camera, detections, aliases);
+                let RunSettings { detections, aliases, .. } = &*self.settings;
+                self.measurements.add_detection(detection, &self.camera, detections, aliases);
             }
             let newest = (report.frame, self.pose(report.frame).unwrap_or(report.pose));
-            let (live, session, measurements) = (&self.live, &self.session, &self.measurements);
-            let known = Known { newest, live, session, measurements };
-            seen.learned = self.associator.learn(&image, &report.names, &known);
+            let (live, session, measurements) = (&self.live_poses, &self.smoother, &self.measurements);
+            let known = AssociationContext { newest, live_poses: live, smoother: session, measurements };
+            seen.corrections = self.associator.learn_from_frame(&image, &report.box_objects, &known);
         } else {
             seen.boxes.clear();
-            report.names.fill(None);
+            report.box_objects.fill(None);
         }
         Ok(seen)
     }
 
     /// Returns the pose of a frame with its factors: to the last frame, or the prior on the first pose. Sets
     /// the predicted pose in `report`.
-    fn tied(&mut self, frame: &Frame, report: &mut FrameReport) -> Result<(Graph, Values), FrameError> {
-        let map = self.up.frame().unwrap_or_else(|| MapFrame::of_odometry(None));
+    fn pose_with_factors(
+        &mut self,
+        frame: &Frame,
+        report: &mut FrameReport,
+    ) -> Result<(Graph, Values), FrameError> {
+        let map = self.up.map_frame().unwrap_or_else(|| MapFrame::of_odometry(None));
         let (mut graph, mut values) = (Graph::new(), Values::new());
         report.pose = match &self.last {
             Some(last) => {
                 let from = self.pose(report.frame - 1).unwrap_or_else(Se3::identity);
-                let estimates = |key: &str| self.session.estimate(key);
+                let estimates = |key: &str| self.smoother.estimate(key);
                 let frames = [report.frame - 1, report.frame];
-                let step = step(frames, [last, frame], &self.settings.odometry, &estimates);
+                let step = motion_step(frames, [last, frame], &self.settings.odometry, &estimates);
                 let motion = &self.settings.motion;
                 let pose = motion.predict(&step, &from);
                 graph.factors_mut().extend(motion.factors(&step)?);
@@ -211,7 +221,7 @@ impl Mapper {
                 graph.push(prior_entry(first, &self.settings));
                 self.settings.own.add_to(&mut graph, &mut values);
                 for known in self.measurements.objects.iter().filter_map(|measured| measured.prior.as_ref()) {
-                    graph.push(known_entry(known, &self.settings));
+                    graph.push(prior_object_entry(known, &self.settings));
                     values.insert(object_key(known.id), known.quadric);
                 }
                 first
@@ -223,23 +233,23 @@ impl Mapper {
 
     /// Updates the smoother with the boxes of a frame. Its pose, `alone`, and the corrections are already
     /// pushed. Returns whether the boxes were accepted.
-    fn update_with(
+    fn update_smoother(
         &mut self,
         boxes: &BTreeMap<ObjectId, ObjectBox>,
-        corrected: Option<Corrected>,
+        corrected: Option<AppliedCorrections>,
         alone: (&Graph, &Values),
         report: &mut FrameReport,
     ) -> Result<bool, FrameError> {
         let mut pushed = self.push_boxes_of_frame(boxes);
-        let mut update = self.session.update();
+        let mut update = self.smoother.update();
         match (corrected, &update) {
-            (Some(corrected), Ok(_)) => self.names = corrected.names,
+            (Some(corrected), Ok(_)) => self.id_changes = corrected.id_changes,
             (Some(corrected), Err(error)) => {
-                self.undo(corrected, &error.to_string(), report);
-                self.session.set_time(report.timestamp)?;
-                self.session.push(alone.0, alone.1)?;
+                self.undo_corrections(corrected, &error.to_string(), report);
+                self.smoother.set_time(report.timestamp)?;
+                self.smoother.push(alone.0, alone.1)?;
                 pushed = self.push_boxes_of_frame(boxes);
-                update = self.session.update();
+                update = self.smoother.update();
             }
             (None, _) => {}
         }
@@ -247,7 +257,7 @@ impl Mapper {
             (Ok(update), Ok(pushed)) => {
                 report.updates.push(update);
                 for (owner, factor) in pushed {
-                    if let Some(Tracked::Mapped(mapped)) = self.objects.get_mut(&owner) {
+                    if let Some(ObjectState::Mapped(mapped)) = self.objects.get_mut(&owner) {
                         mapped.boxes.push((report.frame, factor));
                     }
                 }
@@ -258,9 +268,9 @@ impl Mapper {
                 why.to_string()
             }
             (Err(why), Ok(pushed)) if !pushed.is_empty() => {
-                self.session.set_time(report.timestamp)?;
-                self.session.push(alone.0, alone.1)?;
-                report.updates.push(self.session.update()?);
+                self.smoother.set_time(report.timestamp)?;
+                self.smoother.push(alone.0, alone.1)?;
+                report.updates.push(self.smoother.update()?);
                 why.to_string()
             }
             (Err(why), _) => return Err(why.into()),
@@ -275,30 +285,35 @@ impl Mapper {
         boxes: &BTreeMap<ObjectId, ObjectBox>,
     ) -> Result<Vec<(ObjectId, FactorId)>, ChangeError> {
         let (mut graph, mut owners) = (Graph::new(), vec![]);
-        for (id, view) in boxes.iter().filter(|(id, _)| self.objects.get(id).is_some_and(Tracked::is_mapped))
+        for (id, view) in
+            boxes.iter().filter(|(id, _)| self.objects.get(id).is_some_and(ObjectState::is_mapped))
         {
             for entry in view_entries(view, &object_key(*id), self.camera, &self.settings.detections) {
                 graph.push(entry);
                 owners.push(*id);
             }
         }
-        Ok(owners.into_iter().zip(self.session.push(&graph, &Values::new())?).collect())
+        Ok(owners.into_iter().zip(self.smoother.push(&graph, &Values::new())?).collect())
     }
 
     /// Checks that no semantic rule lacks the up direction.
     fn check_rules(&self, up: Option<Direction>) -> Result<(), RuleError> {
         let waiting = self.settings.semantics.iter().find(|rule| up.is_none() && rule.factor.wants_up());
         match waiting {
-            Some(rule) => Err(RuleError::NoUp { factor: rule.factor.name().to_owned() }),
+            Some(rule) => Err(RuleError::NoUp { factor: rule.factor.factor_type().to_owned() }),
             None => Ok(()),
         }
     }
 
     /// Returns the boxes of a frame that pass the filters, by object. If an object has several boxes, the
     /// last one counts.
-    fn boxes(&self, named: &[Detection]) -> BTreeMap<ObjectId, ObjectBox> {
-        let view = |detection: &Detection| match sift(detection, &self.camera, &self.settings.detections) {
-            Sifted::View(view) => Some((detection.object?, view)),
+    fn boxes_by_object(&self, named: &[Detection]) -> BTreeMap<ObjectId, ObjectBox> {
+        let view = |detection: &Detection| match filter_detection(
+            detection,
+            &self.camera,
+            &self.settings.detections,
+        ) {
+            FilteredDetection::View(view) => Some((detection.object?, view)),
             _ => None,
         };
         named.iter().filter_map(view).collect()

@@ -1,43 +1,43 @@
 //! Online estimate of the up direction.
 use manifactor_mapping::gravity::{GravityError, MapFrame};
-use manifactor_mapping::settings::Settings;
-use manifactor_recording::sequence::{Observation, Opening, Sequence};
+use manifactor_mapping::settings::RunSettings;
+use manifactor_recording::sequence::{Observation, Sequence, SequenceHeader};
 
 /// Change of the up direction at which factors are created again: half a degree in radians.
-const MOVED: f64 = 0.01;
+const MIN_UP_CHANGE_RAD: f64 = 0.01;
 
 /// The up direction from the first frames, until it is final.
 #[derive(Debug, Clone)]
-pub(super) struct Up {
+pub(super) struct UpEstimate {
     /// Relevant data of the frames so far.
     seen: Sequence,
     found: Option<MapFrame>,
-    is_settled: bool,
+    is_final: bool,
 }
 
-impl Up {
-    pub(super) fn new(opening: Opening) -> Self {
-        Self { seen: opening.into_sequence(), found: None, is_settled: false }
+impl UpEstimate {
+    pub(super) fn new(opening: SequenceHeader) -> Self {
+        Self { seen: opening.into_sequence(), found: None, is_final: false }
     }
 
     /// Returns the frame of the map; `None` before the first frame.
-    pub(super) fn frame(&self) -> Option<MapFrame> {
+    pub(super) fn map_frame(&self) -> Option<MapFrame> {
         self.found
     }
 
     /// Returns a copy to restore if the next frame is rejected; `None` once the direction is final.
-    pub(super) fn unsettled(&self) -> Option<Self> {
-        (!self.is_settled).then(|| self.clone())
+    pub(super) fn backup_unless_final(&self) -> Option<Self> {
+        (!self.is_final).then(|| self.clone())
     }
 
     /// Adds the next frame. Returns whether the up direction changed, so that the factors that use it
     /// have to be created again.
-    pub(super) fn look(
+    pub(super) fn add_frame(
         &mut self,
         observation: &Observation,
-        settings: &Settings,
+        settings: &RunSettings,
     ) -> Result<bool, GravityError> {
-        if self.is_settled {
+        if self.is_final {
             return Ok(false);
         }
         let frames = self.seen.frames.len();
@@ -45,7 +45,7 @@ impl Up {
         self.seen.accelerometer.extend(observation.accelerometer.iter().cloned());
         let gravity = &settings.gravity;
         let first = self.seen.frames.first().unwrap_or(&observation.frame);
-        let anchored = |located| settings.anchor().map_or(located, |anchor| anchor.frame(first, located));
+        let anchored = |located| settings.anchor().map_or(located, |anchor| anchor.map_frame(first, located));
         let found = match (gravity.locate(&self.seen).map(anchored), self.found) {
             (Ok(found), _) => found,
             // readings may cancel out for a while; then the earlier result stays
@@ -56,9 +56,9 @@ impl Up {
             }
         };
         let first = self.seen.frames.first().map_or(0.0, |frame| frame.timestamp);
-        self.is_settled = observation.frame.timestamp - first >= gravity.settled_after();
-        if self.is_settled {
-            self.seen = Opening::new(self.seen.camera).into_sequence();
+        self.is_final = observation.frame.timestamp - first >= gravity.final_after_s();
+        if self.is_final {
+            self.seen = SequenceHeader::new(self.seen.camera).into_sequence();
         }
         let Some(before) = self.found else {
             self.found = Some(found);
@@ -70,7 +70,7 @@ impl Up {
             _ => f64::INFINITY,
         };
         // the last update is used even if the change is small
-        if angle < if self.is_settled { f64::EPSILON } else { MOVED } {
+        if angle < if self.is_final { f64::EPSILON } else { MIN_UP_CHANGE_RAD } {
             return Ok(false);
         }
         // poses stay unchanged: only the first frame defines the position of the map

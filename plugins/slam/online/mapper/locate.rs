@@ -2,7 +2,7 @@
 use super::Mapper;
 use manifactor_geometry::Se3;
 use manifactor_graph::Noise;
-use manifactor_mapping::mapping::measurements::Measured;
+use manifactor_mapping::mapping::measurements::ObjectMeasurements;
 use manifactor_mapping::mapping::object_key;
 use manifactor_quadric::DualQuadric;
 use manifactor_recording::prior_map::PriorMap;
@@ -13,11 +13,11 @@ mod agreement;
 mod layout;
 
 use agreement::Agreement;
-use layout::{Layout, Mark};
+use layout::{Layout, LayoutObject};
 
 /// Start pose of a run in a prior map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Located {
+pub struct Relocalization {
     /// Pose of the first camera in the frame of the prior map.
     pub start: Se3,
     /// Noise of the start pose: rad, then m.
@@ -35,28 +35,30 @@ pub struct Located {
 }
 
 /// Variance of the centre of an object without a marginal covariance, relative to its squared distance.
-const UNKNOWN: f64 = 0.04;
+const UNKNOWN_CENTRE_VARIANCE: f64 = 0.04;
 
 impl Mapper {
     /// Finds the start pose in `map` from the mapped objects. The covariances in `map` are used unchanged.
     /// `None` as long as the result is ambiguous.
-    pub fn locate(&self, map: &PriorMap) -> Option<Located> {
+    pub fn locate(&self, map: &PriorMap) -> Option<Relocalization> {
         let first = self.pose_of(0)?;
-        let marks = self.objects().filter_map(|(measured, quadric)| self.mark(measured, &quadric));
-        let layout = Layout::new(marks.collect(), self.up(), map, self.settings.association.uses_names());
+        let marks = self.objects().filter_map(|(measured, quadric)| self.layout_object(measured, &quadric));
+        let layout =
+            Layout::new(marks.collect(), self.up(), map, self.settings.association.uses_source_ids());
         let (aligned, agreement) = layout.align(|aligned| self.agreement(aligned, &layout, map))?;
         let start = aligned.known_from_local.compose(&first);
         let noise = aligned.noise(&first).ok()?;
         let (Agreement { overlap, seen }, lead) = (agreement, aligned.lead);
-        Some(Located { start, noise, lead, overlap, seen, matches: aligned.matches })
+        Some(Relocalization { start, noise, lead, overlap, seen, matches: aligned.matches })
     }
 
-    fn mark(&self, measured: &Measured, quadric: &DualQuadric) -> Option<Mark> {
+    fn layout_object(&self, measured: &ObjectMeasurements, quadric: &DualQuadric) -> Option<LayoutObject> {
         let key = object_key(measured.id);
-        let distance = (quadric.centroid() - self.live.last()?.pose.translation).norm();
-        let variance = self.session.covariance(&[key.as_str()]);
-        let variance = variance
-            .map_or(UNKNOWN * distance * distance, |of| (3..6).map(|i| of[(i, i)]).sum::<f64>() / 3.0);
-        Some(Mark::new(measured.id, quadric, variance, measured.classes()))
+        let distance = (quadric.centroid() - self.live_poses.last()?.pose.translation).norm();
+        let variance = self.smoother.covariance(&[key.as_str()]);
+        let variance = variance.map_or(UNKNOWN_CENTRE_VARIANCE * distance * distance, |of| {
+            (3..6).map(|i| of[(i, i)]).sum::<f64>() / 3.0
+        });
+        Some(LayoutObject::new(measured.id, quadric, variance, measured.classes()))
     }
 }

@@ -1,35 +1,35 @@
 //! State of an object, from its first box to the map and beyond.
 use manifactor_geometry::Se3;
-use manifactor_mapping::mapping::measurements::{Measured, ObjectBox};
+use manifactor_mapping::mapping::measurements::{ObjectBox, ObjectMeasurements};
 use manifactor_quadric::{Camera, DualQuadric};
 use manifactor_smoother::FactorId;
 use nalgebra::Vector3;
 
 /// State of an object.
 #[derive(Debug, Clone)]
-pub(super) enum Tracked {
+pub(super) enum ObjectState {
     /// A tentative track: the object cannot be initialized yet.
-    Waiting(Sights),
+    Tentative(ViewingDirections),
     /// The object is in the map.
-    Mapped(Mapped),
+    Mapped(MappedState),
     /// The object was removed from the map because its boxes belong to several objects.
-    Withdrawn,
+    Removed,
 }
 
 /// Viewing directions of an object.
 #[derive(Debug, Clone)]
-pub(super) struct Sights {
+pub(super) struct ViewingDirections {
     /// Lines of sight in the map frame, from the poses at the time.
     lines: Vec<Vector3<f64>>,
     /// Smallest cosine between two of them.
     cosine: f64,
     /// Number of boxes at the last failed initialization.
-    tried: usize,
+    boxes_at_last_attempt: usize,
 }
 
 /// An object in the map.
 #[derive(Debug, Clone)]
-pub(super) struct Mapped {
+pub(super) struct MappedState {
     /// Initial value.
     pub start: DualQuadric,
     /// Factors of its boxes, each with its frame.
@@ -39,27 +39,27 @@ pub(super) struct Mapped {
 }
 
 /// After a failed initialization, the number of boxes has to grow by this factor before the next attempt.
-const MORE: f64 = 1.2;
+const RETRY_BOX_GROWTH: f64 = 1.2;
 
-impl Default for Tracked {
+impl Default for ObjectState {
     fn default() -> Self {
-        Self::Waiting(Sights::new())
+        Self::Tentative(ViewingDirections::new())
     }
 }
 
-impl Tracked {
+impl ObjectState {
     /// Returns the state of an object of the prior map.
-    pub(super) fn known(measured: &Measured) -> Option<Self> {
+    pub(super) fn of_prior_object(measured: &ObjectMeasurements) -> Option<Self> {
         let start = measured.prior.as_ref()?.quadric;
         let class = measured.class_name().map(str::to_owned);
-        Some(Self::Mapped(Mapped { start, boxes: vec![], class }))
+        Some(Self::Mapped(MappedState { start, boxes: vec![], class }))
     }
 
     pub(super) fn is_mapped(&self) -> bool {
         matches!(self, Self::Mapped(_))
     }
 
-    pub(super) fn born_as(&self) -> Option<DualQuadric> {
+    pub(super) fn initial_value(&self) -> Option<DualQuadric> {
         match self {
             Self::Mapped(mapped) => Some(mapped.start),
             _ => None,
@@ -67,10 +67,10 @@ impl Tracked {
     }
 }
 
-impl Sights {
+impl ViewingDirections {
     /// Returns a set without views.
     pub(super) fn new() -> Self {
-        Self { lines: vec![], cosine: 1.0, tried: 0 }
+        Self { lines: vec![], cosine: 1.0, boxes_at_last_attempt: 0 }
     }
 
     /// Adds the line of sight of a box.
@@ -83,13 +83,14 @@ impl Sights {
 
     /// Returns whether an initialization is worth an attempt: the parallax is large enough, and there are
     /// enough new boxes since the last attempt.
-    pub(super) fn are_enough(&self, measured: &Measured, degrees: f64) -> bool {
+    pub(super) fn suffice_for_initialization(&self, measured: &ObjectMeasurements, degrees: f64) -> bool {
         let angle = self.cosine.clamp(-1.0, 1.0).acos().to_degrees();
-        angle >= degrees && measured.views.len() as f64 >= MORE * self.tried as f64
+        angle >= degrees
+            && measured.views.len() as f64 >= RETRY_BOX_GROWTH * self.boxes_at_last_attempt as f64
     }
 
     /// Records a failed initialization with this number of boxes.
-    pub(super) fn note_try(&mut self, boxes: usize) {
-        self.tried = boxes;
+    pub(super) fn record_failed_attempt(&mut self, boxes: usize) {
+        self.boxes_at_last_attempt = boxes;
     }
 }

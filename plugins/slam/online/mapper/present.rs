@@ -1,9 +1,9 @@
 //! Access to the current map for viewers of a stream.
 use super::Mapper;
-use super::object::Tracked;
+use super::object::ObjectState;
 use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
-use manifactor_mapping::mapping::measurements::Measured;
+use manifactor_mapping::mapping::measurements::ObjectMeasurements;
 use manifactor_quadric::{Camera, DualQuadric};
 use manifactor_recording::sequence::Observation;
 
@@ -15,22 +15,22 @@ impl Mapper {
 
     /// Returns the up direction in the map; `None` if unknown.
     pub fn up(&self) -> Option<Direction> {
-        self.up.frame().and_then(|frame| frame.up)
+        self.up.map_frame().and_then(|frame| frame.up)
     }
 
     /// Returns the estimated pose of a frame; after it has left the window, the estimate at its time.
     pub fn pose_of(&self, frame: usize) -> Option<Se3> {
-        self.pose(frame).or_else(|| self.live.get(frame).map(|live| live.pose))
+        self.pose(frame).or_else(|| self.live_poses.get(frame).map(|live| live.pose))
     }
 
     /// Returns the camera pose by odometry alone, in the frame of the map; `None` before the first frame.
     pub fn odometry(&self, observation: &Observation) -> Option<Se3> {
-        Some(self.up.frame()?.map_from_odometry.compose(&observation.frame.world_from_camera))
+        Some(self.up.map_frame()?.map_from_odometry.compose(&observation.frame.world_from_camera))
     }
 
     /// Returns the mapped objects by id, with their measurements and estimates.
-    pub fn objects(&self) -> impl Iterator<Item = (&Measured, DualQuadric)> {
-        let mapped = self.objects.iter().filter(|(_, object)| Tracked::is_mapped(object));
+    pub fn objects(&self) -> impl Iterator<Item = (&ObjectMeasurements, DualQuadric)> {
+        let mapped = self.objects.iter().filter(|(_, object)| ObjectState::is_mapped(object));
         mapped.filter_map(|(id, _)| Some((self.measured(*id)?, self.quadric(*id)?)))
     }
 }

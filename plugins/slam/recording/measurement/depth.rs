@@ -1,5 +1,5 @@
 //! Distance of an object along the optical axis.
-use super::{Errors, Innovation, Measurement, Rows, UsualDepth};
+use super::{Innovation, Measurement, MeasurementSigmas, ResidualRows, UsualDepth};
 use crate::register_measurement;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::Positive;
@@ -13,9 +13,9 @@ use std::sync::Arc;
 /// Distance of the object's centre along the optical axis, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Depth(pub Positive);
+pub struct DepthMeasurement(pub Positive);
 
-impl Measurement for Depth {
+impl Measurement for DepthMeasurement {
     fn name(&self) -> &'static str {
         "depth"
     }
@@ -32,8 +32,8 @@ impl Measurement for Depth {
         1
     }
 
-    fn deviations(&self, errors: &Errors, residual: &Rows) -> Rows {
-        Rows::repeat(errors.depth * (self.0.get() + residual[0]))
+    fn deviations(&self, errors: &MeasurementSigmas, residual: &ResidualRows) -> ResidualRows {
+        ResidualRows::repeat(errors.depth * (self.0.get() + residual[0]))
     }
 
     fn cost_of_new(&self, usual: &UsualDepth) -> f64 {
@@ -57,4 +57,4 @@ impl Measurement for Depth {
     }
 }
 
-register_measurement!("depth", Depth);
+register_measurement!("depth", DepthMeasurement);

@@ -11,7 +11,7 @@ pub(crate) struct Observations<S> {
 }
 
 impl<S: AsRef<Sequence>> Observations<S> {
-    pub(crate) fn of(sequence: S) -> Self {
+    pub(crate) fn from_sequence(sequence: S) -> Self {
         Self { sequence, frames: 0, boxes: 0, readings: 0 }
     }
 }

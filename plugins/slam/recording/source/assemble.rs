@@ -1,9 +1,9 @@
 //! Frames and detections, matched by time.
 use super::SourceError;
-use crate::measurement::{Depth, Quantities};
-use crate::recording::OBJECTS;
+use crate::measurement::{DepthMeasurement, Quantities};
+use crate::recording::OBJECTS_FILE;
 use crate::sequence::{
-    ClassScores, Detection, Frame, GroundTruth, ObjectId, TrueObject, UnusedDetection, WithoutPose,
+    ClassScores, Detection, DetectionsWithoutPose, Frame, GroundTruth, ObjectId, TrueObject, UnusedDetection,
 };
 use manifactor_config::{Document, Errors};
 use manifactor_formats::tum::{StampedPose, Trajectory};
@@ -13,11 +13,11 @@ use manifactor_quadric::BoundingBox;
 use std::path::Path;
 
 /// Frames, their detections, and the detections without a frame.
-pub(super) type Matched = (Vec<Frame>, Vec<Detection>, Vec<UnusedDetection>);
+pub(super) type MatchedDetections = (Vec<Frame>, Vec<Detection>, Vec<UnusedDetection>);
 
 /// Limits for matching detections with frames by time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Matching {
+pub(super) struct TimeMatching {
     /// Largest time difference. Unit: seconds.
     pub within: NotNegative,
     /// Largest expected share of detections without a frame.
@@ -26,15 +26,15 @@ pub(super) struct Matching {
 
 /// Returns the default: a tenth of the detections may lack an odometry pose, as at the beginning of a
 /// recording.
-pub(super) fn a_tenth() -> Share {
+pub(super) fn default_share() -> Share {
     Share::literal(0.1)
 }
 
 /// Returns whether a share is the default, which is not written, so that fingerprints of settings stay the
 /// same.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
-pub(super) fn is_a_tenth(share: &Share) -> bool {
-    *share == a_tenth()
+pub(super) fn is_default_share(share: &Share) -> bool {
+    *share == default_share()
 }
 
 /// Reads odometry and detections. Each detection is assigned to the frame nearest in time; detections without
@@ -42,7 +42,11 @@ pub(super) fn is_a_tenth(share: &Share) -> bool {
 ///
 /// # Errors
 /// Files that cannot be read, or detections that all lack a frame.
-pub(super) fn read_matched(odometry: &Path, file: &Path, by: Matching) -> Result<Matched, SourceError> {
+pub(super) fn read_matched(
+    odometry: &Path,
+    file: &Path,
+    by: TimeMatching,
+) -> Result<MatchedDetections, SourceError> {
     let within = *by.within;
     let frames = read_poses(odometry)?.into_iter();
     let frames = frames.map(|StampedPose { timestamp, pose }| Frame { timestamp, world_from_camera: pose });
@@ -67,12 +71,22 @@ pub(super) fn read_matched(odometry: &Path, file: &Path, by: Matching) -> Result
 }
 
 /// Returns a summary of the rows without a frame; `None` if there are none.
-fn without_frame(frames: &[Frame], rows: &[detections::Detection], by: Matching) -> Option<WithoutPose> {
-    let Matching { within, without_pose: allowed } = by;
-    let away = |row: &detections::Detection| Some((row.timestamp, nearest(frames, row.timestamp)?.1));
+fn without_frame(
+    frames: &[Frame],
+    rows: &[detections::DetectionRow],
+    by: TimeMatching,
+) -> Option<DetectionsWithoutPose> {
+    let TimeMatching { within, without_pose: allowed } = by;
+    let away = |row: &detections::DetectionRow| Some((row.timestamp, nearest(frames, row.timestamp)?.1));
     let far: Vec<(f64, f64)> = rows.iter().filter_map(away).filter(|(_, away)| *away > *within).collect();
     let nearest = far.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some(WithoutPose { rows: far.len(), of: rows.len(), allowed: *allowed, within: *within, nearest })
+    Some(DetectionsWithoutPose {
+        rows: far.len(),
+        of: rows.len(),
+        allowed: *allowed,
+        within: *within,
+        nearest,
+    })
 }
 
 /// Reads the poses of a file. Repairs are logged.
@@ -93,7 +107,7 @@ fn nearest(frames: &[Frame], timestamp: f64) -> Option<(usize, f64)> {
     away.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-fn detection(frame: usize, row: &detections::Detection) -> Result<Detection, SourceError> {
+fn detection(frame: usize, row: &detections::DetectionRow) -> Result<Detection, SourceError> {
     let scores: ClassScores = match row.class_scores() {
         Ok(scores) => scores.into_iter().collect(),
         // cannot happen: the reader has checked the scores
@@ -107,13 +121,13 @@ fn detection(frame: usize, row: &detections::Detection) -> Result<Detection, Sou
         quantities: row
             .depth
             .and_then(|depth| Positive::new(depth).ok())
-            .map_or(Quantities::NONE, |depth| Quantities::one(Depth(depth))),
+            .map_or(Quantities::NONE, |depth| Quantities::one(DepthMeasurement(depth))),
     })
 }
 
 /// Reads the true objects from the named file, or from the file that `simulate` writes, if it exists.
 pub(super) fn read_objects(folder: &Path, named: Option<&Path>) -> Result<Vec<TrueObject>, SourceError> {
-    let file = folder.join(named.unwrap_or(Path::new(OBJECTS)));
+    let file = folder.join(named.unwrap_or(Path::new(OBJECTS_FILE)));
     if named.is_none() && !file.is_file() {
         return Ok(vec![]);
     }

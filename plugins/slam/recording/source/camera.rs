@@ -44,9 +44,9 @@ pub enum CameraName {
 // serde's own untagged enum would only report that no variant fits, and not the error in a field
 impl<'de> Deserialize<'de> for CameraChoice {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        struct Plain(CameraChoice);
-        struct Either;
-        impl<'de> Visitor<'de> for Either {
+        struct UntaggedCamera(CameraChoice);
+        struct CameraVisitor;
+        impl<'de> Visitor<'de> for CameraVisitor {
             type Value = CameraChoice;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("the name of a camera, or a table of its fx, fy, cx, cy, width and height, with the `type` of another model than the pinhole")
@@ -58,15 +58,15 @@ impl<'de> Deserialize<'de> for CameraChoice {
                 Camera::deserialize(MapAccessDeserializer::new(table)).map(CameraChoice::Pinhole)
             }
         }
-        impl<'de> Deserialize<'de> for Plain {
+        impl<'de> Deserialize<'de> for UntaggedCamera {
             fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-                from.deserialize_any(Either).map(Self)
+                from.deserialize_any(CameraVisitor).map(Self)
             }
         }
         manifactor_config::deserialize_with(from, |node| {
             let choice = match node.field("type") {
                 Some(_) => Self::Model(node.try_read()?),
-                None => node.try_read::<Plain>()?.0,
+                None => node.try_read::<UntaggedCamera>()?.0,
             };
             Ok(Box::new(choice))
         })

@@ -6,22 +6,22 @@
 //!
 //! If a frame cannot be written, for example on a full disk, it is still mapped. The journal ends there, and
 //! the run reports it.
-use super::stream::Stream;
+use super::stream::FrameStream;
 use crate::sequence::Observation;
-use crate::source::{line, parse};
-use manifactor_formats::journal::{Journal, JournalError, Record};
+use crate::source::{format_line, parse};
+use manifactor_formats::journal::{Journal, JournalError, JournalRecord};
 use manifactor_graph::Manifold;
 use std::collections::HashSet;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-impl Record for Observation {
+impl JournalRecord for Observation {
     const NAME: &'static str = "frame";
-    const BEGINNINGS: &'static [&'static str] = &[r#"{"checked_frames_for":""#, r#"{"frames_for":""#];
+    const HEADER_STARTS: &'static [&'static str] = &[r#"{"checked_frames_for":""#, r#"{"frames_for":""#];
 
     fn write(&self) -> io::Result<String> {
-        Ok(line(self))
+        Ok(format_line(self))
     }
 
     fn read(line: &[u8]) -> Result<Self, String> {
@@ -35,7 +35,7 @@ impl Record for Observation {
 /// # Errors
 /// A file that cannot be read or written, is a link, or is not the journal of these settings. It stays
 /// unchanged.
-pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Stream, JournalError> {
+pub fn journaled(stream: FrameStream, path: &Path, fingerprint: &str) -> Result<FrameStream, JournalError> {
     let (mut journal, before) = Journal::<Observation>::open(path, fingerprint)?;
     let past = before.iter().map(|frame| frame.frame.timestamp).fold(f64::NEG_INFINITY, f64::max);
     let had: HashSet<u64> = before.iter().map(|frame| frame.frame.timestamp.to_bits()).collect();
@@ -43,7 +43,7 @@ pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Strea
         frame.as_ref().map_or(true, |frame| !had.contains(&frame.frame.timestamp.to_bits()))
     };
     let new = stream.observations.filter(is_new);
-    let lost = Lost::default();
+    let lost = LostFrameCounter::default();
     let (path, counted) = (path.to_owned(), lost.clone());
     let kept = new.map(move |frame| {
         let frame = frame?;
@@ -52,18 +52,18 @@ pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Strea
             counted.add(&path, None);
             return Ok(frame);
         }
-        Ok(keep(&mut journal, &frame).unwrap_or_else(|source| {
+        Ok(append_frame(&mut journal, &frame).unwrap_or_else(|source| {
             counted.add(&path, Some(source));
             frame
         }))
     });
     let observations = Box::new(before.into_iter().map(Ok).chain(kept));
-    Ok(Stream { opening: stream.opening, observations, past, lost })
+    Ok(FrameStream { opening: stream.opening, observations, recorded_frames: past, lost })
 }
 
 /// Shared count of the frames that a journal could not store.
 #[derive(Debug, Clone, Default)]
-pub struct Lost(Arc<Mutex<Option<LostFrames>>>);
+pub struct LostFrameCounter(Arc<Mutex<Option<LostFrames>>>);
 
 /// Frames that a journal could not store.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,7 +76,7 @@ pub struct LostFrames {
     pub reason: String,
 }
 
-impl Lost {
+impl LostFrameCounter {
     /// Returns the lost frames so far; `None` if all frames are stored.
     pub fn get(&self) -> Option<LostFrames> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
@@ -92,7 +92,7 @@ impl Lost {
 
 /// Appends a frame and returns it as it will be read, because writing and reading a rotation may change its
 /// last digit. A non-finite frame is not written; the map rejects it as well.
-fn keep(journal: &mut Journal<Observation>, frame: &Observation) -> io::Result<Observation> {
+fn append_frame(journal: &mut Journal<Observation>, frame: &Observation) -> io::Result<Observation> {
     if !(frame.frame.timestamp.is_finite() && frame.frame.world_from_camera.is_finite()) {
         return Ok(frame.clone());
     }
@@ -103,15 +103,15 @@ fn keep(journal: &mut Journal<Observation>, frame: &Observation) -> io::Result<O
 mod tests {
     use super::*;
     use crate::measurement::Quantities;
-    use crate::sequence::{ClassScores, Detection, Frame, ObjectId, Opening};
+    use crate::sequence::{ClassScores, Detection, Frame, ObjectId, SequenceHeader};
     use manifactor_geometry::Se3;
     use manifactor_quadric::{BoundingBox, Camera};
     use nalgebra::Vector6;
 
     /// Twelve frames of a camera that moves ahead, each with two boxes.
-    fn stream() -> Stream {
+    fn stream() -> FrameStream {
         let camera = Camera::new([500.0, 500.0, 320.0, 240.0], 640, 480).unwrap();
-        let mut sequence = Opening::new(camera).into_sequence();
+        let mut sequence = SequenceHeader::new(camera).into_sequence();
         for i in 0..12 {
             let t = f64::from(i) / 7.0;
             let world_from_camera = Se3::exp(&Vector6::new(0.1 * t, 0.2, 0.3, t, 0.5, 0.6 * t));
@@ -130,7 +130,7 @@ mod tests {
         Arc::new(sequence).into()
     }
 
-    fn frames(stream: Stream, count: usize) -> Vec<Observation> {
+    fn frames(stream: FrameStream, count: usize) -> Vec<Observation> {
         stream.observations.take(count).map(Result::unwrap).collect()
     }
 

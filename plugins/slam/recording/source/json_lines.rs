@@ -1,10 +1,11 @@
 use super::assemble::read_ground_truth;
 use super::rectification::Rectification;
-use super::stream::Stream;
-use super::{CameraChoice, Folders, Source, SourceError};
+use super::stream::FrameStream;
+use super::{CameraChoice, InputFolders, SequenceSource, SourceError};
 use crate::measurement::Quantities;
 use crate::sequence::{
-    Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Opening, Sequence, UnusedDetection,
+    Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Sequence, SequenceHeader,
+    UnusedDetection,
 };
 use indexmap::IndexMap;
 use manifactor_formats::FormatError;
@@ -63,7 +64,7 @@ struct Line {
     #[serde(default)]
     boxes: Vec<serde_json::Value>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    accelerometer: Vec<Reading>,
+    accelerometer: Vec<AccelerometerReading>,
 }
 
 /// A box in the form of a line; `quantities` collects all further fields.
@@ -73,7 +74,7 @@ struct LineBox {
     bounding_box: BoundingBox,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     class: Option<String>,
-    #[serde(default = "sure", skip_serializing_if = "is_sure")]
+    #[serde(default = "certain_score", skip_serializing_if = "is_certain")]
     score: Share,
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     scores: IndexMap<String, f64>,
@@ -88,21 +89,21 @@ const FIELDS: [&str; 5] = ["box", "class", "score", "scores", "object"];
 
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Reading {
+struct AccelerometerReading {
     timestamp: f64,
     acceleration: Vector3<f64>,
 }
 
-fn sure() -> Share {
+fn certain_score() -> Share {
     Share::literal(1.0)
 }
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
-fn is_sure(score: &Share) -> bool {
+fn is_certain(score: &Share) -> bool {
     **score >= 1.0
 }
 
 /// Returns a frame as a line for this source, without the line end.
-pub fn line(observation: &Observation) -> String {
+pub fn format_line(observation: &Observation) -> String {
     let of_box = |detection: &Detection| {
         let scores: IndexMap<String, f64> = detection.scores.iter().map(|(c, s)| (c.to_owned(), s)).collect();
         let first = scores.first().filter(|_| scores.len() == 1);
@@ -110,13 +111,14 @@ pub fn line(observation: &Observation) -> String {
         LineBox {
             bounding_box: detection.bounding_box,
             scores: if single.is_some() { IndexMap::new() } else { scores },
-            score: single.as_ref().map_or_else(sure, |(_, score)| *score),
+            score: single.as_ref().map_or_else(certain_score, |(_, score)| *score),
             class: single.map(|(class, _)| class),
             object: detection.object,
             quantities: detection.quantities.to_fields().collect(),
         }
     };
-    let of_reading = |r: &Acceleration| Reading { timestamp: r.timestamp, acceleration: r.acceleration };
+    let of_reading =
+        |r: &Acceleration| AccelerometerReading { timestamp: r.timestamp, acceleration: r.acceleration };
     let line = Line {
         timestamp: observation.frame.timestamp,
         pose: observation.frame.world_from_camera,
@@ -146,7 +148,8 @@ pub fn parse(line: &[u8]) -> Result<Observation, String> {
             Err(fault) => unused.push(UnusedDetection::Box { timestamp, place: place + 1, fault }),
         }
     }
-    let of_reading = |r: Reading| Acceleration { timestamp: r.timestamp, acceleration: r.acceleration };
+    let of_reading =
+        |r: AccelerometerReading| Acceleration { timestamp: r.timestamp, acceleration: r.acceleration };
     Ok(Observation {
         frame: Frame { timestamp, world_from_camera: pose },
         detections,
@@ -206,37 +209,37 @@ impl LineBox {
 }
 
 /// True once standard input has been read: it can be read only once.
-static READ: AtomicBool = AtomicBool::new(false);
+static STDIN_IS_READ: AtomicBool = AtomicBool::new(false);
 /// Name of standard input in messages.
-const STDIN: &str = "standard input";
+const STDIN_NAME: &str = "standard input";
 /// Some editors write it at the beginning of a file.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Bytes of the longest line that can be a frame.
-const LONGEST: u64 = 1 << 26;
+const MAX_LINE_BYTES: u64 = 1 << 26;
 /// Reading stops after this many further bytes without a line end.
-const ENDLESS: u64 = 1 << 30;
+const MAX_SKIPPED_BYTES: u64 = 1 << 30;
 /// Reading stops after this many consecutive lines that are not frames: half a minute of a camera at 30 Hz. A
 /// device such as `/dev/urandom`, or an unrelated file, may have no frames and no end.
-const UNREADABLE: usize = 1000;
+const MAX_UNREADABLE_LINES: usize = 1000;
 
 #[typetag::serialize(name = "json_lines")]
-impl Source for JsonLines {
-    fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
-        self.lines(folders)?.collect()
+impl SequenceSource for JsonLines {
+    fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
+        self.open_lines(folders)?.collect()
     }
 
-    fn open(&self, folders: &Folders) -> Result<Option<Stream>, SourceError> {
-        Ok(Some(self.lines(folders)?))
+    fn open(&self, folders: &InputFolders) -> Result<Option<FrameStream>, SourceError> {
+        Ok(Some(self.open_lines(folders)?))
     }
 }
-register!(dyn Source, "json_lines", JsonLines);
+register!(dyn SequenceSource, "json_lines", JsonLines);
 
 impl JsonLines {
-    fn lines(&self, folders: &Folders) -> Result<Stream, SourceError> {
+    fn open_lines(&self, folders: &InputFolders) -> Result<FrameStream, SourceError> {
         let truth = self.ground_truth.as_deref().map(|file| read_ground_truth(&folders.document, Some(file)));
         let ground_truth = truth.transpose()?.flatten();
         let lens = Rectification::new(&self.camera, None)?;
-        let opening = Opening { camera: lens.camera, up: self.up, ground_truth };
+        let opening = SequenceHeader { camera: lens.camera, up: self.up, ground_truth };
         let (file, reader): (_, Box<dyn BufRead + Send>) = match &self.file {
             Some(file) => {
                 let file = folders.beside_document(file);
@@ -244,24 +247,24 @@ impl JsonLines {
                     File::open(&file).map_err(|source| FormatError::Io { path: file.clone(), source })?;
                 (file, Box::new(BufReader::new(opened)))
             }
-            None if READ.swap(true, Ordering::Relaxed) => {
-                return Err(SourceError::ReadBefore { file: STDIN.into() });
+            None if STDIN_IS_READ.swap(true, Ordering::Relaxed) => {
+                return Err(SourceError::ReadBefore { file: STDIN_NAME.into() });
             }
-            None => (STDIN.into(), Box::new(BufReader::new(stdin()))),
+            None => (STDIN_NAME.into(), Box::new(BufReader::new(stdin()))),
         };
-        let lines = Lines { file, reader, line: 0, text: vec![], unreadable: 0 };
+        let lines = FrameLines { file, reader, line: 0, text: vec![], unreadable: 0 };
         let rectified = lines.fuse().map(move |read| {
             read.map(|mut observation| {
                 lens.apply_to_frame(&mut observation);
                 observation
             })
         });
-        Ok(Stream::new(opening, rectified))
+        Ok(FrameStream::new(opening, rectified))
     }
 }
 
 /// Lines of a file, up to its end or to a read error.
-struct Lines {
+struct FrameLines {
     file: PathBuf,
     reader: Box<dyn BufRead + Send>,
     line: usize,
@@ -270,16 +273,16 @@ struct Lines {
     unreadable: usize,
 }
 
-impl Lines {
+impl FrameLines {
     /// Reads the next line and returns its length, 0 at the end.
     fn read(&mut self) -> std::io::Result<usize> {
         self.line += 1;
         self.text.clear();
-        let read = self.reader.by_ref().take(LONGEST).read_until(b'\n', &mut self.text)?;
-        if read as u64 == LONGEST && !self.text.ends_with(b"\n") {
+        let read = self.reader.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', &mut self.text)?;
+        if read as u64 == MAX_LINE_BYTES && !self.text.ends_with(b"\n") {
             // skips the rest of the line; a line that never ends is an error
-            let skipped = self.reader.by_ref().take(ENDLESS).skip_until(b'\n')?;
-            if skipped as u64 == ENDLESS {
+            let skipped = self.reader.by_ref().take(MAX_SKIPPED_BYTES).skip_until(b'\n')?;
+            if skipped as u64 == MAX_SKIPPED_BYTES {
                 return Err(std::io::Error::other("there is no end of a line within a gigabyte"));
             }
         }
@@ -290,33 +293,33 @@ impl Lines {
     }
 
     /// Stops reading.
-    fn give_up(&mut self) {
+    fn stop_reading(&mut self) {
         self.reader = Box::new(std::io::empty());
     }
 
     /// Returns the frame of the last line that was read.
-    fn frame(&mut self) -> Result<Observation, SourceError> {
+    fn parse_frame(&mut self) -> Result<Observation, SourceError> {
         let read = self.parse();
         self.unreadable = if read.is_ok() { 0 } else { self.unreadable + 1 };
         let (file, line) = (self.file.clone(), self.line);
         read.map_err(|message| match self.unreadable {
-            UNREADABLE => {
-                self.give_up();
-                SourceError::NoFrames { file, line, count: UNREADABLE, message }
+            MAX_UNREADABLE_LINES => {
+                self.stop_reading();
+                SourceError::NoFrames { file, line, count: MAX_UNREADABLE_LINES, message }
             }
             _ => SourceError::Line { file, line, message },
         })
     }
 
     fn parse(&self) -> Result<Observation, String> {
-        if self.text.len() as u64 == LONGEST {
-            return Err(format!("the line is longer than {LONGEST} bytes"));
+        if self.text.len() as u64 == MAX_LINE_BYTES {
+            return Err(format!("the line is longer than {MAX_LINE_BYTES} bytes"));
         }
         parse(&self.text)
     }
 }
 
-impl Iterator for Lines {
+impl Iterator for FrameLines {
     type Item = Result<Observation, SourceError>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -324,9 +327,9 @@ impl Iterator for Lines {
             match self.read() {
                 Ok(0) => return None,
                 Ok(_) if self.text.trim_ascii().is_empty() => {}
-                Ok(_) => return Some(self.frame()),
+                Ok(_) => return Some(self.parse_frame()),
                 Err(source) => {
-                    self.give_up();
+                    self.stop_reading();
                     return Some(Err(FormatError::Io { path: self.file.clone(), source }.into()));
                 }
             }
@@ -353,7 +356,7 @@ mod tests {
         let bad_box = good.replace("}}", r#"}, "boxes": [{"box": [9, 0, 1, 1]}]}"#);
         let text = format!("\u{feff}{good}\n{{\n{bad_box}\n{good}");
         let folder = tempfile::tempdir().unwrap();
-        let folders = Folders { data: None, document: folder.path().into() };
+        let folders = InputFolders { data: None, document: folder.path().into() };
         let source = source(folder.path(), &text);
         let stream = source.open(&folders).unwrap().unwrap();
         let read: Vec<_> = stream.observations.collect();
@@ -369,20 +372,24 @@ mod tests {
     #[test]
     fn a_file_without_frames_is_given_up() {
         let good = r#"{"timestamp": 1.0, "pose": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}"#;
-        let bad = "\u{1}{?\n".repeat(UNREADABLE - 1);
+        let bad = "\u{1}{?\n".repeat(MAX_UNREADABLE_LINES - 1);
         let folder = tempfile::tempdir().unwrap();
-        let folders = Folders { data: None, document: folder.path().into() };
+        let folders = InputFolders { data: None, document: folder.path().into() };
         let read = |text: &str| -> Vec<_> {
             let stream = source(folder.path(), text).open(&folders).unwrap().unwrap();
             stream.observations.collect()
         };
         // a frame in between resets the count
         let sound = read(&format!("{bad}{good}\n{bad}{good}\n"));
-        assert_eq!((sound.len(), sound.iter().filter(|read| read.is_ok()).count()), (2 * UNREADABLE, 2));
+        assert_eq!(
+            (sound.len(), sound.iter().filter(|read| read.is_ok()).count()),
+            (2 * MAX_UNREADABLE_LINES, 2)
+        );
         let given_up = read(&format!("{good}\n{bad}{bad}{good}\n"));
-        assert_eq!(given_up.len(), 1 + UNREADABLE);
+        assert_eq!(given_up.len(), 1 + MAX_UNREADABLE_LINES);
         let error = given_up.last().unwrap().as_ref().unwrap_err().to_string();
-        let place = format!("line {}: {UNREADABLE} lines in a row are no frames", UNREADABLE + 1);
+        let place =
+            format!("line {}: {MAX_UNREADABLE_LINES} lines in a row are no frames", MAX_UNREADABLE_LINES + 1);
         assert!(error.contains(&place) && error.contains("check `source.file`"), "{error}");
     }
 

@@ -1,7 +1,9 @@
-use super::assemble::{Matching, a_tenth, is_a_tenth, read_ground_truth, read_matched, read_objects};
+use super::assemble::{
+    TimeMatching, default_share, is_default_share, read_ground_truth, read_matched, read_objects,
+};
 use super::camera::CameraChoice;
 use super::rectification::{Distortion, Rectification};
-use super::{Folders, Source, SourceError};
+use super::{InputFolders, SequenceSource, SourceError};
 use crate::sequence::Sequence;
 use manifactor_graph::checked::{NotNegative, Share};
 use manifactor_graph::{Direction, register};
@@ -21,7 +23,8 @@ use std::path::PathBuf;
 /// ```
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Recorded {
+#[schemars(rename = "Recorded")]
+pub struct RecordedFiles {
     /// Folder of the files.
     pub folder: PathBuf,
     /// The camera.
@@ -51,7 +54,7 @@ pub struct Recorded {
     pub max_time_difference: NotNegative,
     /// Largest expected share of detections without a pose at their time, from 0 to 1. If more lack a pose,
     /// the run ends with exit code 1.
-    #[serde(default = "a_tenth", skip_serializing_if = "is_a_tenth")]
+    #[serde(default = "default_share", skip_serializing_if = "is_default_share")]
     pub max_without_pose: Share,
 }
 
@@ -66,12 +69,12 @@ fn exact() -> NotNegative {
 }
 
 #[typetag::serialize(name = "recorded")]
-impl Source for Recorded {
-    fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
+impl SequenceSource for RecordedFiles {
+    fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.folder)?;
         let lens = Rectification::new(&self.camera, self.distortion)?;
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
-        let by = Matching { within: self.max_time_difference, without_pose: self.max_without_pose };
+        let by = TimeMatching { within: self.max_time_difference, without_pose: self.max_without_pose };
         let (frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
         lens.apply(&mut detections)?;
         let mut truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
@@ -90,4 +93,4 @@ impl Source for Recorded {
         })
     }
 }
-register!(dyn Source, "recorded", Recorded);
+register!(dyn SequenceSource, "recorded", RecordedFiles);

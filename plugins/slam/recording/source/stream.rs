@@ -2,9 +2,9 @@
 pub mod confirmed;
 
 use super::SourceError;
-use super::journal::Lost;
-use crate::sequence::{Observation, Observations, Opening, Sequence};
-use confirmed::Confirmed;
+use super::journal::LostFrameCounter;
+use crate::sequence::{Observation, Observations, Sequence, SequenceHeader};
+use confirmed::OrderedFrames;
 use std::fmt;
 use std::ops::ControlFlow;
 use std::panic::resume_unwind;
@@ -14,25 +14,30 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// A sequence whose frames arrive one by one: from a file, a simulator or a sensor.
-pub struct Stream {
+pub struct FrameStream {
     /// Data that are known before the first frame.
-    pub opening: Opening,
+    pub opening: SequenceHeader,
     /// Frames in the order of the source, normally by time. Unreadable input is an error, and later frames
     /// may be valid.
     pub observations: Box<dyn Iterator<Item = Result<Observation, SourceError>> + Send>,
     /// Frames up to this time are repeated from a journal and arrive without delay. Unit: seconds.
-    pub past: f64,
+    pub recorded_frames: f64,
     /// Frames that the journal could not store.
-    pub lost: Lost,
+    pub lost: LostFrameCounter,
 }
 
-impl Stream {
+impl FrameStream {
     /// Creates a stream of new frames.
     pub fn new(
-        opening: Opening,
+        opening: SequenceHeader,
         observations: impl Iterator<Item = Result<Observation, SourceError>> + Send + 'static,
     ) -> Self {
-        Self { opening, observations: Box::new(observations), past: f64::NEG_INFINITY, lost: Lost::default() }
+        Self {
+            opening,
+            observations: Box::new(observations),
+            recorded_frames: f64::NEG_INFINITY,
+            lost: LostFrameCounter::default(),
+        }
     }
 
     /// Waits for the last frame and returns all frames.
@@ -41,7 +46,7 @@ impl Stream {
     /// The first error.
     pub fn collect(self) -> Result<Sequence, SourceError> {
         let mut all = self.opening.into_sequence();
-        for observation in Confirmed::new(self.observations) {
+        for observation in OrderedFrames::new(self.observations) {
             all.push(observation?);
         }
         Ok(all)
@@ -49,15 +54,15 @@ impl Stream {
 }
 
 /// Frames that a separate thread reads, one ahead, so that the caller can work while no frame arrives.
-pub struct Awaited {
+pub struct PrefetchedFrames {
     frames: Receiver<Result<Observation, SourceError>>,
     reader: Option<JoinHandle<()>>,
 }
 
 /// Interval at which `next` calls `goes_on` while no frame arrives.
-const NAP: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-impl Awaited {
+impl PrefetchedFrames {
     /// Starts the thread that reads the frames.
     pub fn new(observations: Box<dyn Iterator<Item = Result<Observation, SourceError>> + Send>) -> Self {
         let (sender, frames) = sync_channel(0);
@@ -79,7 +84,7 @@ impl Awaited {
         mut goes_on: impl FnMut() -> ControlFlow<()>,
     ) -> ControlFlow<(), Option<Result<Observation, SourceError>>> {
         loop {
-            match self.frames.recv_timeout(NAP) {
+            match self.frames.recv_timeout(POLL_INTERVAL) {
                 Ok(frame) => return ControlFlow::Continue(Some(frame)),
                 Err(RecvTimeoutError::Timeout) => goes_on()?,
                 Err(RecvTimeoutError::Disconnected) => {
@@ -93,14 +98,14 @@ impl Awaited {
     }
 }
 
-impl From<Arc<Sequence>> for Stream {
+impl From<Arc<Sequence>> for FrameStream {
     fn from(sequence: Arc<Sequence>) -> Self {
-        let opening = sequence.opening();
-        Self::new(opening, Observations::of(sequence).map(Ok))
+        let opening = sequence.header();
+        Self::new(opening, Observations::from_sequence(sequence).map(Ok))
     }
 }
 
-impl fmt::Debug for Stream {
+impl fmt::Debug for FrameStream {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Stream").field("opening", &self.opening).finish_non_exhaustive()
     }

@@ -1,7 +1,7 @@
-use super::assemble::{Matching, a_tenth, is_a_tenth, read_ground_truth, read_matched};
+use super::assemble::{TimeMatching, default_share, is_default_share, read_ground_truth, read_matched};
 use super::camera::{CameraChoice, by_folder};
 use super::rectification::{Distortion, Rectification};
-use super::{Folders, Source, SourceError};
+use super::{InputFolders, SequenceSource, SourceError};
 use crate::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
 use manifactor_graph::checked::{NotNegative, Share};
@@ -46,7 +46,7 @@ pub struct TumRgbd {
     pub max_time_difference: NotNegative,
     /// Largest expected share of detections without a pose at their time, from 0 to 1. If more lack a pose,
     /// the run ends with exit code 1.
-    #[serde(default = "a_tenth", skip_serializing_if = "is_a_tenth")]
+    #[serde(default = "default_share", skip_serializing_if = "is_default_share")]
     pub max_without_pose: Share,
 }
 
@@ -58,21 +58,21 @@ fn exact() -> NotNegative {
 }
 
 #[typetag::serialize(name = "tum")]
-impl Source for TumRgbd {
-    fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
+impl SequenceSource for TumRgbd {
+    fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.sequence)?;
         let lens = match &self.camera {
             Some(choice) => Rectification::new(choice, self.distortion)?,
             None => Rectification::of_pinhole(by_folder(&folder)?, self.distortion),
         };
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
-        let by = Matching { within: self.max_time_difference, without_pose: self.max_without_pose };
+        let by = TimeMatching { within: self.max_time_difference, without_pose: self.max_without_pose };
         let (frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
         lens.apply(&mut detections)?;
         let truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         let file = folder.join("accelerometer.txt");
         let readings = if file.is_file() { accelerometer::read(&file)? } else { vec![] };
-        let reading = |r: accelerometer::Acceleration| Acceleration {
+        let reading = |r: accelerometer::StampedAcceleration| Acceleration {
             timestamp: r.timestamp,
             acceleration: r.acceleration,
         };
@@ -87,4 +87,4 @@ impl Source for TumRgbd {
         })
     }
 }
-register!(dyn Source, "tum", TumRgbd);
+register!(dyn SequenceSource, "tum", TumRgbd);

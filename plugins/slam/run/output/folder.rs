@@ -12,9 +12,9 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Name of the file that names the owner of a folder.
-const MARKER: &str = ".manifactor";
+const MARKER_FILE: &str = ".manifactor";
 /// Upper bound of the size of a marker, in bytes.
-const LONG: u64 = 1 << 16;
+const MAX_MARKER_BYTES: u64 = 1 << 16;
 
 /// Error that prevents results from being written into a folder.
 #[derive(Debug, thiserror::Error)]
@@ -76,8 +76,8 @@ impl OutputFolder {
         let document = document.canonicalize().unwrap_or_else(|_| document.to_owned());
         // quoted, so that any name stays on one line
         let owner = format!("manifactor {command} {document:?}\n");
-        make(path).map_err(|source| FolderError::Io { path: path.to_owned(), source })?;
-        let place = path.join(MARKER);
+        create_folder(path).map_err(|source| FolderError::Io { path: path.to_owned(), source })?;
+        let place = path.join(MARKER_FILE);
         // a refused folder gets no marker; a process that was killed immediately leaves an empty one
         let unmarked = place.symlink_metadata().map_or(true, |at| at.len() == 0);
         if !force && unmarked && !lies_in_one_of(path, command) {
@@ -86,9 +86,9 @@ impl OutputFolder {
         let io = |source| FolderError::Io { path: place.clone(), source };
         let mut marker = open_regular(&place).map_err(io)?;
         let locked = marker.try_lock();
-        let found = text(&marker);
+        let found = marker_text(&marker);
         if let Err(TryLockError::WouldBlock) = locked {
-            return Err(FolderError::InUse { folder: path.to_owned(), process: process(&found) });
+            return Err(FolderError::InUse { folder: path.to_owned(), process: process_id(&found) });
         }
         let ours = found.starts_with(&owner);
         if !ours && !force {
@@ -97,7 +97,7 @@ impl OutputFolder {
         // a file system without locks does not prevent a run, but then a different process may be using the
         // folder
         if ours && locked.is_ok() {
-            clean(path);
+            remove_unfinished_files(path);
         }
         let kept = owner.len() as u64;
         let process = format!("process {}\n", std::process::id());
@@ -120,7 +120,7 @@ impl Drop for OutputFolder {
     }
 }
 
-fn make(folder: &Path) -> io::Result<()> {
+fn create_folder(folder: &Path) -> io::Result<()> {
     match std::fs::create_dir_all(folder) {
         Err(error) if error.kind() == ErrorKind::AlreadyExists => Err(ErrorKind::NotADirectory.into()),
         made => made,
@@ -130,17 +130,17 @@ fn make(folder: &Path) -> io::Result<()> {
 /// Returns whether the parent folder belongs to the command, as a run's folder does for its variants.
 fn lies_in_one_of(folder: &Path, command: &str) -> bool {
     let Ok(folder) = folder.canonicalize() else { return false };
-    let Some(place) = folder.parent().map(|outer| outer.join(MARKER)) else { return false };
+    let Some(place) = folder.parent().map(|outer| outer.join(MARKER_FILE)) else { return false };
     // opening a pipe would block until its writer opens it
     let is_file = place.symlink_metadata().is_ok_and(|at| at.is_file());
     let ours = format!("manifactor {command} ");
-    is_file && File::open(place).is_ok_and(|marker| text(&marker).starts_with(&ours))
+    is_file && File::open(place).is_ok_and(|marker| marker_text(&marker).starts_with(&ours))
 }
 
 /// Returns the text of a marker. On some systems a locked marker cannot be read and gives an empty text.
-fn text(marker: &File) -> String {
+fn marker_text(marker: &File) -> String {
     let mut bytes = vec![];
-    let _ = marker.take(LONG).read_to_end(&mut bytes);
+    let _ = marker.take(MAX_MARKER_BYTES).read_to_end(&mut bytes);
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
@@ -150,7 +150,7 @@ fn refuse_others(folder: &Path) -> Result<(), FolderError> {
     let names = std::fs::read_dir(folder).map_err(io)?.map(|entry| entry.map(|entry| entry.file_name()));
     let names = names.collect::<io::Result<Vec<_>>>().map_err(io)?;
     // the first name in order, so that the message is reproducible
-    match names.into_iter().filter(|name| name != MARKER).min() {
+    match names.into_iter().filter(|name| name != MARKER_FILE).min() {
         None => Ok(()),
         Some(name) => {
             let found = name.to_string_lossy().into_owned();
@@ -167,7 +167,7 @@ fn refuse_other_results(folder: &Path, owner: &str, marker: &str) -> Result<(), 
         return Ok(());
     };
     if !writer.starts_with("manifactor ") {
-        return Err(FolderError::Foreign { folder: folder.to_owned(), found: MARKER.to_owned() });
+        return Err(FolderError::Foreign { folder: folder.to_owned(), found: MARKER_FILE.to_owned() });
     }
     refuse_others(folder).map_err(|_| FolderError::Other {
         folder: folder.to_owned(),
@@ -177,7 +177,7 @@ fn refuse_other_results(folder: &Path, owner: &str, marker: &str) -> Result<(), 
 }
 
 /// Removes unfinished files of killed runs from a folder and from the folders of its variants.
-fn clean(folder: &Path) {
+fn remove_unfinished_files(folder: &Path) {
     remove_unfinished(folder);
     let inner = std::fs::read_dir(folder).into_iter().flatten().flatten();
     inner
@@ -186,7 +186,7 @@ fn clean(folder: &Path) {
 }
 
 /// Returns the number of the process that a marker names.
-fn process(marker: &str) -> Option<u32> {
+fn process_id(marker: &str) -> Option<u32> {
     marker.lines().find_map(|line| line.strip_prefix("process "))?.parse().ok()
 }
 

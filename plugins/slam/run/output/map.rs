@@ -1,10 +1,10 @@
 //! The map that a run writes for later runs.
 use manifactor_graph::{FactorEntry, Graph, Key, Noise};
-use manifactor_mapping::estimate::looks::{Looked, looks};
-use manifactor_mapping::estimate::{Estimate, Landmark};
-use manifactor_mapping::mapping::measurements::Measured;
+use manifactor_mapping::estimate::looks::{ObjectLooks, count_looks};
+use manifactor_mapping::estimate::{Estimate, LandmarkEstimate};
+use manifactor_mapping::mapping::measurements::ObjectMeasurements;
 use manifactor_mapping::mapping::object_key;
-use manifactor_mapping::settings::Settings;
+use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::QuadricPrior;
 use manifactor_recording::prior_map::{PriorMap, PriorObject};
 use manifactor_recording::sequence::ObjectId;
@@ -29,20 +29,20 @@ pub enum MapError {
 }
 
 /// Smallest weight of a factor after its robust loss.
-const LEAST_WEIGHT: f64 = 1e-9;
+const MIN_WEIGHT: f64 = 1e-9;
 /// Standard deviations of an unobserved object: rotation (rad), centre (m), log semi-axes.
-const UNKNOWN: [f64; 9] = [1.0, 1.0, 1.0, 10.0, 10.0, 10.0, 1.0, 1.0, 1.0];
+const UNOBSERVED_SIGMAS: [f64; 9] = [1.0, 1.0, 1.0, 10.0, 10.0, 10.0, 1.0, 1.0, 1.0];
 
 /// Returns the map of an estimate, without objects that are gone. Objects of the prior map without new
 /// views are kept as they were read, so that a map does not fade from run to run.
 ///
 /// # Errors
 /// If the covariances cannot be computed.
-pub fn map_of(estimate: &Estimate, settings: &Settings) -> Result<PriorMap, MapError> {
-    let new = looks(estimate, *settings.detections.border_px);
+pub fn map_of(estimate: &Estimate, settings: &RunSettings) -> Result<PriorMap, MapError> {
+    let new = count_looks(estimate, *settings.detections.border_px);
     let mut covariances = covariances(estimate)?;
-    let object = |landmark: Landmark<'_>| {
-        let Landmark { object, quadric, .. } = landmark;
+    let object = |landmark: LandmarkEstimate<'_>| {
+        let LandmarkEstimate { object, quadric, .. } = landmark;
         let measured = estimate.mapping.measurements.object(object.id)?;
         let looked = new.get(&object.id).copied().unwrap_or_default();
         if is_gone(measured, looked, settings) {
@@ -68,14 +68,14 @@ pub fn map_of(estimate: &Estimate, settings: &Settings) -> Result<PriorMap, MapE
 
 /// An object counts as gone if the probability of missing it in all looks since its last detection is smaller
 /// than this.
-const MISSED: f64 = 0.001;
+const MAX_MISS_PROBABILITY: f64 = 0.001;
 /// Smallest number of looks since its last detection at which an object can count as gone.
-const LOOKS: usize = 8;
+const MIN_LOOKS: usize = 8;
 
 /// Returns the numbers of mapped objects that are gone.
-pub(super) fn gone(estimate: &Estimate, settings: &Settings) -> Vec<ObjectId> {
-    let looks = looks(estimate, *settings.detections.border_px);
-    let is_gone = |(id, looked): (ObjectId, Looked)| {
+pub(super) fn gone_objects(estimate: &Estimate, settings: &RunSettings) -> Vec<ObjectId> {
+    let looks = count_looks(estimate, *settings.detections.border_px);
+    let is_gone = |(id, looked): (ObjectId, ObjectLooks)| {
         let measured = estimate.mapping.measurements.object(id)?;
         is_gone(measured, looked, settings).then_some(id)
     };
@@ -84,17 +84,17 @@ pub(super) fn gone(estimate: &Estimate, settings: &Settings) -> Vec<ObjectId> {
 
 /// Returns whether an object is gone: at its detection rate so far, it should have been detected again since
 /// its last detection in this run or before, but was not.
-fn is_gone(measured: &Measured, looked: Looked, settings: &Settings) -> bool {
+fn is_gone(measured: &ObjectMeasurements, looked: ObjectLooks, settings: &RunSettings) -> bool {
     let prior = measured.prior.as_ref().map(|prior| prior.looks).unwrap_or_default();
-    let missed = (1.0 - prior.plus(looked.before).rate()).powf(looked.since as f64);
+    let missed = (1.0 - prior.plus(looked.before).detection_rate()).powf(looked.since as f64);
     // held-out boxes do not count as missed
-    settings.evaluation.holdout.is_none() && looked.since >= LOOKS && missed < MISSED
+    settings.evaluation.holdout.is_none() && looked.since >= MIN_LOOKS && missed < MAX_MISS_PROBABILITY
 }
 
 /// Gives the factors of the prior map the covariances that were read, without the settings' `sigma_scale` and
 /// `shape_error`. The written covariances are then again those of white noise. Each factor keeps the weight
 /// that its robust loss had in the solve.
-fn as_written(graph: &mut Graph, estimate: &Estimate) {
+fn restore_written_covariances(graph: &mut Graph, estimate: &Estimate) {
     let weights: HashMap<usize, f64> =
         estimate.solution.factors.iter().map(|f| (f.entry, f.weight)).collect();
     let priors = estimate.mapping.measurements.objects.iter().filter_map(|object| object.prior.as_ref());
@@ -106,7 +106,7 @@ fn as_written(graph: &mut Graph, estimate: &Estimate) {
     };
     for (place, entry) in graph.factors_mut().iter_mut().enumerate() {
         let Some(prior) = known(entry) else { continue };
-        let weight = weights.get(&place).copied().unwrap_or(1.0).max(LEAST_WEIGHT);
+        let weight = weights.get(&place).copied().unwrap_or(1.0).max(MIN_WEIGHT);
         let noise = Noise::covariance(DMatrix::from_fn(9, 9, |r, c| prior.covariance[r][c] / weight));
         // a map that was read has a valid covariance
         entry.noise = noise.unwrap_or_default();
@@ -115,21 +115,21 @@ fn as_written(graph: &mut Graph, estimate: &Estimate) {
 }
 
 /// Returns the covariance of each object by key. Undetermined directions get the standard deviations of
-/// `UNKNOWN`.
+/// `UNOBSERVED_SIGMAS`.
 fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, MapError> {
     let (mut graph, values) = (estimate.mapping.graph.clone(), &estimate.solution.values);
     let keys: HashSet<&str> = estimate.mapping.mapped().map(|object| object.key.as_str()).collect();
     if keys.is_empty() {
         return Ok(HashMap::new());
     }
-    as_written(&mut graph, estimate);
+    restore_written_covariances(&mut graph, estimate);
     for landmark in estimate.landmarks() {
         graph.push(FactorEntry {
             keys: vec![landmark.object.key.clone()],
             name: None,
             factor: Arc::new(QuadricPrior { value: *landmark.quadric }),
             // the literals are positive
-            noise: Noise::sigmas(&UNKNOWN).unwrap_or_default(),
+            noise: Noise::sigmas(&UNOBSERVED_SIGMAS).unwrap_or_default(),
             loss: None,
         });
     }

@@ -1,5 +1,5 @@
 //! Check that a run does not overwrite the map that it reads.
-use super::{MAP, variant_folder};
+use super::{MAP_FILE, variant_folder};
 use manifactor_config::{Diagnostics, Errors, Fault};
 use manifactor_mapping::settings::run_document::RunDocument;
 
@@ -10,7 +10,8 @@ use manifactor_mapping::settings::run_document::RunDocument;
 /// All such maps, each at its position in the document.
 pub fn refuse_own_maps(run: &RunDocument) -> Result<(), Diagnostics> {
     let errors = Errors::new();
-    let written = run.variants.iter().map(|variant| variant_folder(&run.output, &variant.name).join(MAP));
+    let written =
+        run.variants.iter().map(|variant| variant_folder(&run.output, &variant.name).join(MAP_FILE));
     // a file that does not exist yet was not read
     let written: Vec<_> = written.filter_map(|file| file.canonicalize().ok()).collect();
     for prior in run.variants.iter().filter_map(|variant| variant.settings.prior_map.as_ref()) {

@@ -4,8 +4,8 @@
 //! `frames.jsonl` contains its frames, one per line.
 use manifactor_graph::Direction;
 use manifactor_mapping::estimate::Estimate;
-use manifactor_mapping::settings::Settings;
-use manifactor_mapping::settings::run_document::{Variant, slug};
+use manifactor_mapping::settings::RunSettings;
+use manifactor_mapping::settings::run_document::{RunVariant, slug};
 use manifactor_metrics::Alignment;
 use manifactor_quadric::Camera;
 use nalgebra::Vector3;
@@ -19,12 +19,12 @@ mod objects;
 mod variables;
 
 pub use factors::{AppliedFactor, FactorResiduals};
-pub use frames::{FrameRecord, SeenBox, TrackedPose};
-pub use objects::{ObjectRecord, Solid};
+pub use frames::{BoxRecord, FrameRecord, PoseRecord};
+pub use objects::{ObjectRecord, TrueCuboid};
 pub use variables::OwnVariable;
 
 /// File of the record in the folder of the run.
-pub(crate) const RECORD: &str = "record.json";
+pub(crate) const RECORD_FILE: &str = "record.json";
 
 /// Error while reading a record.
 #[derive(Debug, thiserror::Error)]
@@ -115,7 +115,7 @@ impl RunRecord {
     /// # Errors
     /// If the file does not exist, cannot be read, or names a variant's folder outside the folder of the run.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
-        let path = folder.join(RECORD);
+        let path = folder.join(RECORD_FILE);
         let text = std::fs::read_to_string(&path)
             .map_err(|source| RecordError::Io { path: path.clone(), source })?;
         let record: Self = match serde_json::from_str(&text) {
@@ -133,9 +133,9 @@ impl RunRecord {
 
 impl VariantRecord {
     /// Creates the record of an estimate.
-    pub fn new(variant: &Variant, estimate: &Estimate) -> Self {
-        let settings: &Settings = &variant.settings;
-        let drawn = drawn::Frames::of(estimate, *settings.evaluation.max_time_difference);
+    pub fn new(variant: &RunVariant, estimate: &Estimate) -> Self {
+        let settings: &RunSettings = &variant.settings;
+        let drawn = drawn::RecordFrames::of(estimate, *settings.evaluation.max_time_difference);
         let (frames, alignment) = frames::frames(estimate, &settings.evaluation, &drawn);
         Self {
             name: variant.name.clone(),
@@ -171,7 +171,7 @@ fn finite_or_nan<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Erro
 
 /// Returns the up direction in the frame of the record. If it is unknown, it is guessed as up in the first
 /// image.
-fn up(estimate: &Estimate, drawn: &drawn::Frames) -> Direction {
+fn up(estimate: &Estimate, drawn: &drawn::RecordFrames) -> Direction {
     let image_up = || estimate.trajectory().first().map(|p| p.pose.rotation.act(&-Vector3::y()));
     let known = estimate.mapping.frame.up.map(|up| *up);
     let up = known.or_else(image_up).and_then(|up| Direction::new(drawn.estimate.rotation.act(&up)).ok());

@@ -1,10 +1,10 @@
 //! Report of a run, for scripts and for people.
-use crate::output::map::gone;
+use crate::output::map::gone_objects;
 use manifactor_graph::Direction;
-use manifactor_mapping::estimate::variance::Components;
-use manifactor_mapping::estimate::{Estimate, Landmark};
+use manifactor_mapping::estimate::variance::VarianceComponents;
+use manifactor_mapping::estimate::{Estimate, LandmarkEstimate};
 use manifactor_mapping::mapping::{MappedObject, Rejection, Warning};
-use manifactor_mapping::settings::Settings;
+use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::{DualQuadric, LandmarkError};
 use manifactor_recording::sequence::ObjectId;
 use manifactor_solve::{Diagnosis, Outcome, RejectedFactor, Termination, Times};
@@ -19,15 +19,15 @@ mod prior_map;
 mod table;
 mod trajectory;
 
+pub(crate) use association::AssociationHistory;
 pub use association::AssociationReport;
-pub(crate) use association::Naming;
 pub use consistency::ConsistencyReport;
-pub use held_out::{HeldOutReport, Mean, Prediction};
+pub use held_out::{ClusteredMean, HeldOutReport, Prediction};
 pub use landmarks::LandmarkReport;
 pub use online::OnlineReport;
-pub use prior_map::{Found, PriorMapReport};
-pub use table::Row;
-pub use trajectory::name as alignment_name;
+pub use prior_map::{FoundStart, PriorMapReport};
+pub use table::VariantRow;
+pub use trajectory::alignment_name;
 pub use trajectory::{TrajectoryError, TrajectoryReport};
 
 /// Report of a run, variant by variant.
@@ -53,15 +53,15 @@ pub struct VariantReport {
     /// Description in one sentence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub about: Option<String>,
-    /// Fingerprint of the [settings](Settings::fingerprint) in `config.toml` and of the program's version.
+    /// Fingerprint of the [settings](RunSettings::fingerprint) in `config.toml` and of the program's version.
     pub fingerprint: String,
     /// Numbers of frames, boxes, objects and factors.
-    pub counts: Counts,
+    pub counts: RunCounts,
     /// Up direction in the map frame, if known.
     pub up: Option<Direction>,
     /// Estimated noise of each round.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub variance_components: Vec<Components>,
+    pub variance_components: Vec<VarianceComponents>,
     /// Result of data association, unless the objects of the source were used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub association: Option<AssociationReport>,
@@ -97,7 +97,7 @@ pub struct VariantReport {
 
 /// Numbers of frames, boxes, objects and factors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Counts {
+pub struct RunCounts {
     /// Poses.
     pub frames: usize,
     /// Detections in these frames.
@@ -170,7 +170,7 @@ pub struct ObjectReport {
 
 impl VariantReport {
     /// Compares an estimate with ground truth.
-    pub fn new(name: &str, estimate: &Estimate, settings: &Settings, seconds: f64) -> Self {
+    pub fn new(name: &str, estimate: &Estimate, settings: &RunSettings, seconds: f64) -> Self {
         let mapping = &estimate.mapping;
         let mut warnings = mapping.warnings.clone();
         let solve = SolveReport::new(estimate, &mut warnings);
@@ -180,13 +180,13 @@ impl VariantReport {
         let after = landmarks::in_truth_frame(estimate, estimate.landmarks());
         let before = landmarks::in_truth_frame(estimate, estimate.initial_landmarks());
         let objects = objects(estimate, &after);
-        warnings.extend(super::shapes::run_away(estimate));
+        warnings.extend(super::shapes::run_away_warning(estimate));
         let landmarks = LandmarkReport::new(&before, &after);
         Self {
             name: name.to_owned(),
             about: None,
             fingerprint: settings.fingerprint(),
-            counts: Counts::of(estimate),
+            counts: RunCounts::of(estimate),
             up: mapping.frame.up,
             variance_components: estimate.components.clone(),
             association: None,
@@ -198,7 +198,7 @@ impl VariantReport {
             consistency: ConsistencyReport::new(estimate, &settings.evaluation),
             held_out: None,
             objects,
-            gone: gone(estimate, settings),
+            gone: gone_objects(estimate, settings),
             warnings,
             seconds,
         }
@@ -207,7 +207,12 @@ impl VariantReport {
 
 impl VariantReport {
     /// Adds the report about the prior map, and a warning if the run was not located in it.
-    pub(crate) fn tell_prior_map(&mut self, estimate: &Estimate, settings: &Settings, found: Option<Found>) {
+    pub(crate) fn set_prior_map_report(
+        &mut self,
+        estimate: &Estimate,
+        settings: &RunSettings,
+        found: Option<FoundStart>,
+    ) {
         self.prior_map = PriorMapReport::new(estimate, settings, found, &self.gone);
         if let Some(prior) = self.prior_map.as_ref().filter(|prior| !prior.is_located) {
             self.warnings.push(Warning::NotLocated { file: prior.file.clone() });
@@ -215,7 +220,7 @@ impl VariantReport {
     }
 }
 
-impl Counts {
+impl RunCounts {
     fn of(estimate: &Estimate) -> Self {
         let Estimate { sequence, mapping, .. } = estimate;
         let m = &mapping.measurements;
@@ -272,7 +277,7 @@ pub(super) fn object_errors(estimate: &Estimate) -> Vec<(ObjectId, LandmarkError
     errors.into_iter().map(|(landmark, error)| (landmark.object.id, error)).collect()
 }
 
-fn objects(estimate: &Estimate, errors: &[(Landmark<'_>, LandmarkError)]) -> Vec<ObjectReport> {
+fn objects(estimate: &Estimate, errors: &[(LandmarkEstimate<'_>, LandmarkError)]) -> Vec<ObjectReport> {
     let values = &estimate.solution.values;
     let report = |object: &MappedObject| ObjectReport {
         object: object.clone(),

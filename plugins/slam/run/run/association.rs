@@ -1,7 +1,7 @@
 //! Data association in a batch: frame by frame, then a second pass with all frames known.
 use super::RunError;
-use crate::output::report::{AssociationReport, Naming};
-use manifactor_mapping::settings::Settings;
+use crate::output::report::{AssociationHistory, AssociationReport};
+use manifactor_mapping::settings::RunSettings;
 use manifactor_online::Mapper;
 use manifactor_recording::sequence::{Observation, Sequence};
 use manifactor_solve::Observer;
@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Result of the data association.
-pub(super) struct Associated {
+pub(super) struct AssociatedSequence {
     /// The sequence with the assigned objects.
     pub sequence: Arc<Sequence>,
     /// Report; `None` if the source provides the objects.
@@ -22,49 +22,51 @@ pub(super) struct Associated {
 ///
 /// # Errors
 /// If the smoother cannot be started.
-pub(super) fn associated(
+pub(super) fn associate_sequence(
     sequence: Arc<Sequence>,
-    settings: &Settings,
+    settings: &RunSettings,
     observer: &mut dyn Observer,
-) -> Result<Associated, RunError> {
-    if settings.association.uses_names() {
-        return Ok(Associated { sequence, report: None });
+) -> Result<AssociatedSequence, RunError> {
+    if settings.association.uses_source_ids() {
+        return Ok(AssociatedSequence { sequence, report: None });
     }
-    let mut mapper = Mapper::new(sequence.opening(), settings);
-    let (mut named, mut naming) = (Sequence::clone(&sequence), Naming::default());
+    let mut mapper = Mapper::new(sequence.header(), settings);
+    let (mut named, mut naming) = (Sequence::clone(&sequence), AssociationHistory::default());
     let mut taken = vec![];
     let mut interrupted = false;
     for observation in sequence.observations() {
         interrupted |= observer.poll().is_break();
         if interrupted {
-            naming.note(&observation.detections, None);
+            naming.record_frame(&observation.detections, None);
             taken.push(None);
             continue;
         }
-        match mapper.take(&observation) {
+        match mapper.add_frame(&observation) {
             Ok(report) => {
-                naming.note(&observation.detections, Some(&report));
+                naming.record_frame(&observation.detections, Some(&report));
                 report.refused.iter().for_each(|refused| tracing::warn!("{refused}"));
                 taken.push(Some(report.frame));
             }
             Err(error) => {
                 tracing::warn!("{error}");
-                naming.note(&observation.detections, None);
+                naming.record_frame(&observation.detections, None);
                 taken.push(None);
             }
         }
     }
-    mapper.settle().refused.iter().for_each(|refused| tracing::warn!("{refused}"));
+    mapper.finish_association().refused.iter().for_each(|refused| tracing::warn!("{refused}"));
     for ((observation, boxes), frame) in with_boxes(&sequence).zip(&taken) {
         if let Some(frame) = *frame {
-            naming.replace(boxes, mapper.names(), |names| mapper.reconsider(frame, &observation, names));
+            naming.replace_objects(boxes, mapper.id_changes(), |names| {
+                mapper.reassociate(frame, &observation, names)
+            });
         }
     }
-    for (detection, name) in named.detections.iter_mut().zip(naming.now(mapper.names())) {
+    for (detection, name) in named.detections.iter_mut().zip(naming.current_objects(mapper.id_changes())) {
         detection.object = name;
     }
-    let report = naming.report(&*settings.association, mapper.names());
-    Ok(Associated { sequence: Arc::new(named), report })
+    let report = naming.report(&*settings.association, mapper.id_changes());
+    Ok(AssociatedSequence { sequence: Arc::new(named), report })
 }
 
 /// Returns the frames of a sequence, each with the index range of its boxes.

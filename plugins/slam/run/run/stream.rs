@@ -1,14 +1,14 @@
 //! Mapping of a stream while its frames arrive.
 use super::RunError;
-use super::location::Search;
-use crate::output::report::{Found, Naming, OnlineReport, VariantReport};
+use super::location::StartSearch;
+use crate::output::report::{AssociationHistory, FoundStart, OnlineReport, VariantReport};
 use manifactor_mapping::estimate::Estimate;
 use manifactor_mapping::mapping::Warning;
-use manifactor_mapping::settings::Settings;
+use manifactor_mapping::settings::RunSettings;
 use manifactor_online::{FrameError, FrameReport, Mapper};
-use manifactor_recording::sequence::{Observation, Opening, Sequence};
-use manifactor_recording::stream::confirmed::Confirmed;
-use manifactor_recording::stream::{Awaited, Stream};
+use manifactor_recording::sequence::{Observation, Sequence, SequenceHeader};
+use manifactor_recording::stream::confirmed::OrderedFrames;
+use manifactor_recording::stream::{FrameStream, PrefetchedFrames};
 use manifactor_solve::Observer;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -24,18 +24,18 @@ use std::time::Instant;
 /// `watch`.
 pub fn online(
     name: &str,
-    stream: Stream,
-    settings: &Settings,
-    watch: &mut dyn Watch,
+    stream: FrameStream,
+    settings: &RunSettings,
+    watch: &mut dyn StreamWatcher,
     observer: &mut dyn Observer,
 ) -> Result<(Estimate, VariantReport), RunError> {
     let clock = Instant::now();
     let lost = stream.lost.clone();
-    let mut taken = Taken::new(stream.opening, settings);
-    let (mut progress, mut search, mut found) = (OnlineReport::default(), Search::new(settings), None);
-    let mut awaited = Awaited::new(Box::new(Confirmed::new(stream.observations)));
+    let mut taken = StreamState::new(stream.opening, settings);
+    let (mut progress, mut search, mut found) = (OnlineReport::default(), StartSearch::new(settings), None);
+    let mut awaited = PrefetchedFrames::new(Box::new(OrderedFrames::new(stream.observations)));
     loop {
-        let observation = match awaited.next(|| watch.quiet()) {
+        let observation = match awaited.next(|| watch.on_idle()) {
             ControlFlow::Continue(Some(observation)) => observation,
             ControlFlow::Continue(None) => break,
             ControlFlow::Break(()) => {
@@ -44,27 +44,27 @@ pub fn online(
             }
         };
         if let Ok(observation) = &observation
-            && observation.frame.timestamp > stream.past
-            && watch.wait(observation.frame.timestamp).is_break()
+            && observation.frame.timestamp > stream.recorded_frames
+            && watch.before_frame(observation.frame.timestamp).is_break()
         {
             progress.interrupted = true;
             break;
         }
         let began = Instant::now();
         let report = observation.as_ref().map_err(|error| FrameError::Source(error.to_string()));
-        let mut report = report.and_then(|observation| taken.take(observation));
+        let mut report = report.and_then(|observation| taken.add_frame(observation));
         if let Ok(report) = &mut report
-            && let Some(located) = search.look(report, &taken.mapper)
+            && let Some(located) = search.search_after_frame(report, &taken.mapper)
         {
-            let known = settings.beginning_at(located.start, located.noise.clone());
-            taken = taken.again(&known, report);
-            progress.begin_again();
+            let known = settings.with_start(located.start, located.noise.clone());
+            taken = taken.remap(&known, report);
+            progress.reset_map_counts();
             report.located = Some(located.clone());
-            found = Some(Found { frame: report.frame, located });
+            found = Some(FoundStart { frame: report.frame, located });
         }
         let seconds = began.elapsed().as_secs_f64();
-        progress.count(report.as_ref(), seconds);
-        let goes_on = watch.frame(report.as_ref(), observation.as_ref().ok(), &mut taken.mapper, seconds);
+        progress.add_frame(report.as_ref(), seconds);
+        let goes_on = watch.on_frame(report.as_ref(), observation.as_ref().ok(), &mut taken.mapper, seconds);
         if goes_on.is_break() {
             progress.interrupted = true;
             break;
@@ -73,58 +73,58 @@ pub fn online(
     // the reader thread may wait forever for a frame; dropping its handle lets it release the source as early
     // as possible
     drop(awaited);
-    progress.tell(&taken.mapper.settle());
-    progress.end(&mut taken.mapper);
-    watch.end(&mut taken.mapper);
-    let Taken { mapper, mut sequence, naming } = taken;
-    for (detection, name) in sequence.detections.iter_mut().zip(naming.now(mapper.names())) {
+    progress.add_frame_report(&taken.mapper.finish_association());
+    progress.add_final_counts(&mut taken.mapper);
+    watch.on_end(&mut taken.mapper);
+    let StreamState { mapper, mut sequence, association: naming } = taken;
+    for (detection, name) in sequence.detections.iter_mut().zip(naming.current_objects(mapper.id_changes())) {
         detection.object = name;
     }
-    let association = naming.report(&*settings.association, mapper.names());
+    let association = naming.report(&*settings.association, mapper.id_changes());
     let estimate = mapper.finish(Arc::new(sequence), observer)?;
-    progress.compare(&estimate, &settings.evaluation);
+    progress.compare_live_poses(&estimate, &settings.evaluation);
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.association = association;
     if settings.evaluation.holdout.is_some() {
         report.warnings.push(Warning::NotHeldOut);
     }
     report.warnings.extend(lost.get().map(Warning::JournalIncomplete));
-    report.tell_prior_map(&estimate, settings, found);
+    report.set_prior_map_report(&estimate, settings, found);
     report.online = Some(progress);
     report.seconds = clock.elapsed().as_secs_f64();
     Ok((estimate, report))
 }
 
 /// The accepted frames with the map made from them.
-struct Taken {
+struct StreamState {
     mapper: Mapper,
     sequence: Sequence,
-    naming: Naming,
+    association: AssociationHistory,
 }
 
-impl Taken {
-    fn new(opening: Opening, settings: &Settings) -> Self {
+impl StreamState {
+    fn new(opening: SequenceHeader, settings: &RunSettings) -> Self {
         let mapper = Mapper::new(opening.clone(), settings);
-        Self { mapper, sequence: opening.into_sequence(), naming: Naming::default() }
+        Self { mapper, sequence: opening.into_sequence(), association: AssociationHistory::default() }
     }
 
-    fn take(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
-        let report = self.mapper.take(observation)?;
-        self.naming.note(&observation.detections, Some(&report));
+    fn add_frame(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
+        let report = self.mapper.add_frame(observation)?;
+        self.association.record_frame(&observation.detections, Some(&report));
         self.sequence.push(observation.clone());
         Ok(report)
     }
 
     /// Maps the same frames with different settings. Replaces `report` by the one of the last frame, with all
     /// changes to the new map.
-    fn again(self, settings: &Settings, report: &mut FrameReport) -> Self {
-        let (mut again, mut before) = (Self::new(self.sequence.opening(), settings), None);
+    fn remap(self, settings: &RunSettings, report: &mut FrameReport) -> Self {
+        let (mut again, mut before) = (Self::new(self.sequence.header(), settings), None);
         let mut refused = vec![];
         for observation in self.sequence.observations() {
-            match again.take(&observation) {
+            match again.add_frame(&observation) {
                 Ok(mut taken) => {
                     if let Some(before) = before {
-                        taken.tell_after(before);
+                        taken.prepend_changes(before);
                     }
                     before = Some(taken);
                 }
@@ -140,21 +140,21 @@ impl Taken {
 }
 
 /// Observer of a stream of frames.
-pub trait Watch {
+pub trait StreamWatcher {
     /// Called now and then while no frame arrives. `Break` ends the stream.
-    fn quiet(&mut self) -> ControlFlow<()> {
+    fn on_idle(&mut self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
     /// Called before each frame with its timestamp in seconds. Returns when the frame is due. `Break` ends
     /// the stream before it.
-    fn wait(&mut self, _timestamp: f64) -> ControlFlow<()> {
+    fn before_frame(&mut self, _timestamp: f64) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
     /// Called after each frame with the result, the frame if it was readable, the map, and the processing
     /// time in seconds.
-    fn frame(
+    fn on_frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
         observation: Option<&Observation>,
@@ -163,5 +163,5 @@ pub trait Watch {
     ) -> ControlFlow<()>;
 
     /// Called after the last frame, before the batch solve of the whole graph.
-    fn end(&mut self, _mapper: &mut Mapper) {}
+    fn on_end(&mut self, _mapper: &mut Mapper) {}
 }

@@ -5,7 +5,7 @@
 //! random walk as its error. The variance therefore grows with distance, turn and time, at any frame rate. A
 //! camera derives ranges from the size of a barcode, so their error grows with the range. Some barcodes are
 //! misread, hence the robust loss.
-use super::{Seen, Step, aligned_errors, data, drive, errors};
+use super::{LandmarkMeasurement, RobotStep, aligned_errors, data, drive, errors};
 use manifactor_geometry::{BearingRange2, Point2, Se2, So2};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Cauchy;
@@ -54,10 +54,10 @@ impl Odometry {
 }
 
 /// Returns the measurements of landmarks by time, without robots and unknown barcodes.
-fn measurements(rows: &[Vec<f64>], barcodes: &[Vec<f64>]) -> Vec<(f64, Vec<Seen>)> {
+fn measurements(rows: &[Vec<f64>], barcodes: &[Vec<f64>]) -> Vec<(f64, Vec<LandmarkMeasurement>)> {
     let subjects: HashMap<usize, usize> =
         barcodes.iter().map(|row| (row[1] as usize, row[0] as usize)).collect();
-    let mut all: Vec<(f64, Vec<Seen>)> = vec![];
+    let mut all: Vec<(f64, Vec<LandmarkMeasurement>)> = vec![];
     for row in rows {
         let Some(id) = subjects.get(&(row[1] as usize)).copied().filter(|id| *id > ROBOTS) else {
             continue;
@@ -67,7 +67,7 @@ fn measurements(rows: &[Vec<f64>], barcodes: &[Vec<f64>]) -> Vec<(f64, Vec<Seen>
         let noise = Noise::sigmas(&[0.0175, (0.05 * range).max(0.05)]).unwrap();
         let place = bearing.act(&Vector2::new(range, 0.0));
         let factor = Arc::new(BearingRange2::new(bearing, Positive::new(range).unwrap()));
-        let seen = Seen { id, place, factor, noise, loss: Some(Arc::new(Cauchy::default())) };
+        let seen = LandmarkMeasurement { id, place, factor, noise, loss: Some(Arc::new(Cauchy::default())) };
         match all.last_mut().filter(|(time, _)| *time == row[0]) {
             Some((_, list)) => list.push(seen),
             None => all.push((row[0], vec![seen])),
@@ -86,7 +86,7 @@ fn truth_at(truth: &[Vec<f64>], time: f64) -> Vector2<f64> {
 
 /// The stream from the first measurement on, and the Vicon positions of the robot and the landmarks.
 struct Recording {
-    steps: Vec<Step>,
+    steps: Vec<RobotStep>,
     truth: Vec<Vector2<f64>>,
     landmarks: Vec<Vec<f64>>,
 }
@@ -99,7 +99,7 @@ fn recording() -> Option<Recording> {
     let steps = measurements
         .into_iter()
         .enumerate()
-        .map(|(i, (time, seen))| Step { odometry: (i > 0).then(|| odometry.until(time)), seen });
+        .map(|(i, (time, seen))| RobotStep { odometry: (i > 0).then(|| odometry.until(time)), seen });
     Some(Recording { steps: steps.collect(), truth, landmarks: table("Landmark_Groundtruth")? })
 }
 

@@ -1,5 +1,5 @@
 //! Victoria Park: a car among trees that a laser measures (Nebot, ACFR; prepared by Kaess).
-use super::{Seen, Step, aligned_errors, data, drive};
+use super::{LandmarkMeasurement, RobotStep, aligned_errors, data, drive};
 use manifactor_geometry::{Coordinates, Landmark, Se2, So2};
 use manifactor_graph::Noise;
 use nalgebra::{DMatrix, Vector2};
@@ -16,9 +16,9 @@ const TREES: f64 = 0.2;
 /// Standard deviations of the steering error: radians per metre, and a share of the turn.
 const STEERING: [f64; 2] = [0.005, 0.1];
 
-fn steps() -> Option<Vec<Step>> {
+fn steps() -> Option<Vec<RobotStep>> {
     let text = std::fs::read_to_string(data("landmarks_2d/victoria_park.txt")?).unwrap();
-    let mut steps = vec![Step { odometry: None, seen: vec![] }];
+    let mut steps = vec![RobotStep { odometry: None, seen: vec![] }];
     // poses and trees share their numbers
     let mut places = HashMap::from([(0, 0)]);
     for line in text.lines() {
@@ -32,13 +32,19 @@ fn steps() -> Option<Vec<Step>> {
                 DMatrix::from_row_slice(3, 3, &[n[3], n[4], n[5], n[4], n[6], n[7], n[5], n[7], n[8]]);
             let covariance = covariance * ODOMETRY.powi(2);
             let odometry = Some((relative, Noise::covariance(covariance).unwrap()));
-            steps.push(Step { odometry, seen: vec![] });
+            steps.push(RobotStep { odometry, seen: vec![] });
         } else {
             let place = Vector2::new(n[0], n[1]);
             let factor = Arc::new(Landmark::<2> { position: Coordinates::new(place).unwrap() });
             let noise = Noise::sigma(TREES).unwrap();
             let id = numbers[1] as usize;
-            steps[places[&(numbers[0] as usize)]].seen.push(Seen { id, place, factor, noise, loss: None });
+            steps[places[&(numbers[0] as usize)]].seen.push(LandmarkMeasurement {
+                id,
+                place,
+                factor,
+                noise,
+                loss: None,
+            });
         }
     }
     Some(steps)

@@ -1,5 +1,5 @@
 //! Events of the map: their counts, and the newest as text.
-use manifactor_slam::association::Move;
+use manifactor_slam::association::DetectionMove;
 use manifactor_slam::online::FrameReport;
 use manifactor_slam::sequence::ObjectId;
 use serde_json::{Value, json};
@@ -37,21 +37,21 @@ impl Notes {
             let matches = located.matches.len();
             self.note(frame, &format!("the place in the prior map is found, by {matches} objects: names and poses are of that map from now on"));
         }
-        self.born += report.born.len();
-        self.withdrawn += report.withdrawn.len();
+        self.born += report.initialized.len();
+        self.withdrawn += report.removed.len();
         self.moved += report.moved.len();
         self.merged += report.merged.len();
         self.forgotten += report.forgotten.len();
-        for key in &report.born {
+        for key in &report.initialized {
             self.note(frame, &format!("{key} came into the map"));
         }
-        for key in &report.withdrawn {
+        for key in &report.removed {
             self.note(
                 frame,
                 &format!("{key} was withdrawn: its boxes are those of several things, or are others now"),
             );
         }
-        for Move { frame: of, from, into, .. } in &report.moved {
+        for DetectionMove { frame: of, from, into, .. } in &report.moved {
             self.note(frame, &format!("a box of frame {of} shows object {into}, not {from}"));
         }
         for merge in &report.merged {

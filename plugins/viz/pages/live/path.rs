@@ -81,12 +81,12 @@ impl Path {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use manifactor_slam::record::TrackedPose;
+    use manifactor_slam::record::PoseRecord;
 
     fn path(frames: usize) -> Path {
         let mut path = Path::default();
         for i in 0..frames {
-            let tracked = TrackedPose { pose: Se3::identity(), error: None, relative: None };
+            let tracked = PoseRecord { pose: Se3::identity(), error: None, relative: None };
             let (odometry, estimate) = (tracked.clone(), tracked);
             path.push(FrameRecord { timestamp: i as f64, truth: None, odometry, estimate, boxes: vec![] });
         }

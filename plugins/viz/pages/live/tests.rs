@@ -1,9 +1,9 @@
 use super::*;
 use manifactor_geometry::Se3;
 use manifactor_slam::output::map_of;
-use manifactor_slam::run::{Watch, estimate, online};
-use manifactor_slam::settings::Settings;
-use manifactor_slam::source::Folders;
+use manifactor_slam::run::{StreamWatcher, estimate, online};
+use manifactor_slam::settings::RunSettings;
+use manifactor_slam::source::InputFolders;
 use manifactor_solve::Silent;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ fn a_box_has_its_label_behind_what_is_drawn() {
     let measured = BoundingBox::new([1.0, 2.0, 3.0, 4.5]).unwrap();
     let nameless = LiveBox::Nameless(measured, "<script>".to_owned());
     assert_eq!(nameless.to_json(), json!([null, [1, 2, 3, 4.5], null, "<script>"]));
-    let seen = SeenBox::new(ObjectId(7), measured, None, &NO_CAMERA);
+    let seen = BoxRecord::new(ObjectId(7), measured, None, &NO_CAMERA);
     assert_eq!(LiveBox::Named(seen, "cup 7".to_owned()).to_json(), json!([7, [1, 2, 3, 4.5], null, "cup 7"]));
 }
 
@@ -42,8 +42,8 @@ struct Shown {
     located: usize,
 }
 
-impl Watch for Shown {
-    fn frame(
+impl StreamWatcher for Shown {
+    fn on_frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
         observation: Option<&Observation>,
@@ -69,14 +69,14 @@ impl Watch for Shown {
         let notes = self.live.notes.to_json();
         assert!(notes["newest"].to_string().contains("the place in the prior map is found"), "{notes}");
         // objects that were added to the discarded map are not counted
-        assert_eq!(notes["counts"]["born"], report.map_or(0, |report| report.born.len()));
+        assert_eq!(notes["counts"]["born"], report.map_or(0, |report| report.initialized.len()));
         ControlFlow::Continue(())
     }
 }
 
 #[test]
 fn what_was_shown_moves_into_the_map_that_is_found() {
-    let settings = |seed: u32| -> Settings {
+    let settings = |seed: u32| -> RunSettings {
         serde_json::from_value(json!({
             "association": { "type": "likelihood" },
             "odometry": { "noise": { "sigma": 0.005 } },
@@ -93,12 +93,12 @@ fn what_was_shown_moves_into_the_map_that_is_found() {
     };
     let mut first = settings(1);
     first.prior_map = None;
-    let sequence = |settings: &Settings| Arc::new(settings.source.load(&Folders::default()).unwrap());
+    let sequence = |settings: &RunSettings| Arc::new(settings.source.load(&InputFolders::default()).unwrap());
     let (made, _) = estimate("first", sequence(&first), &first, &mut Silent).unwrap();
     let mut second = settings(2);
     second.prior_map.as_mut().unwrap().map = Arc::new(map_of(&made, &first).unwrap());
     // the odometry of the second stream begins elsewhere
-    let (mut stream, all) = (sequence(&second).opening().into_sequence(), sequence(&second));
+    let (mut stream, all) = (sequence(&second).header().into_sequence(), sequence(&second));
     let begin = all.frames[0].world_from_camera;
     stream.up = all.up.and_then(|up| Direction::new(begin.rotation.inverse().act(&up)).ok());
     for mut observation in all.observations() {

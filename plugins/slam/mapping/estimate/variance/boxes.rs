@@ -29,18 +29,18 @@ const MEDIAN: f64 = 0.674_489_750_196_081_7;
 /// the median is 37 % (Rousseeuw and Croux, *Alternatives to the Median Absolute Deviation*, 1993).
 const MEDIAN_VARIANCE: f64 = 0.5 / 0.3678;
 /// Redundancy 1 - h below which a row has no information about its noise.
-const LEAST_REDUNDANCY: f64 = 1e-9;
-/// Number of bins of box sizes, at most; `LEAST_OF_PART` is the smallest number of errors in a bin.
-const PARTS: usize = 8;
-const LEAST_OF_PART: usize = 20;
+const MIN_REDUNDANCY: f64 = 1e-9;
+/// Number of bins of box sizes, at most; `MIN_BIN_ERRORS` is the smallest number of errors in a bin.
+const MAX_BINS: usize = 8;
+const MIN_BIN_ERRORS: usize = 20;
 /// Variance of the squared sizes, relative to their mean square, below which all sizes count as equal.
-const ALIKE: f64 = 1e-6;
+const EQUAL_SIZE_VARIANCE: f64 = 1e-6;
 
 impl BoxComponent {
     /// Creates the noise of a group. `size` is the mean size of its boxes, in pixels.
     pub(super) fn of(sigma_px: f64, of_size: f64, correlation_time: f64, size: f64) -> Self {
         let new = Self { sigma_px, of_size, correlation_time, effective_px: 0.0 };
-        Self { effective_px: new.at(size) * new.inflation(), ..new }
+        Self { effective_px: new.sigma_at(size) * new.inflation(), ..new }
     }
 
     /// Returns the noise multiplied by a factor.
@@ -54,7 +54,7 @@ impl BoxComponent {
         match size.filter(|_| self.of_size > 0.0) {
             None => Noise::sigma(self.effective_px),
             Some(size) => {
-                let [x, y] = size.map(|size| self.at(size) * self.inflation());
+                let [x, y] = size.map(|size| self.sigma_at(size) * self.inflation());
                 Noise::sigmas(&[x, y, x, y])
             }
         }
@@ -66,7 +66,7 @@ impl BoxComponent {
     }
 
     /// Returns the standard deviation of a side, for the extent of its box.
-    pub(super) fn at(&self, size: f64) -> f64 {
+    pub(super) fn sigma_at(&self, size: f64) -> f64 {
         self.sigma_px.hypot(self.of_size * size)
     }
 }
@@ -84,7 +84,7 @@ pub(super) fn size(entry: &FactorEntry) -> Option<[f64; 2]> {
 
 /// Errors of the boxes of an object: by side, then in the order of the boxes.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Errors([Vec<SideError>; 4]);
+pub(super) struct BoxErrors([Vec<SideError>; 4]);
 
 /// Unit: pixels.
 #[derive(Debug, Clone, Copy)]
@@ -95,23 +95,22 @@ struct SideError {
 }
 
 /// A box factor at the estimate.
-pub(super) struct Observed<'a> {
+pub(super) struct ObservedBox<'a> {
     pub(super) entry: &'a FactorEntry,
     pub(super) state: &'a FactorState,
     pub(super) leverage: &'a [f64],
 }
 
-impl Errors {
+impl BoxErrors {
     /// Adds the errors of a box. Residuals are smaller than errors: their variance is σ²(1 - h), with the
     /// leverage h of the row.
-    pub(super) fn add(&mut self, observed: &Observed<'_>) {
-        let Observed { entry, state, leverage } = observed;
+    pub(super) fn add(&mut self, observed: &ObservedBox<'_>) {
+        let ObservedBox { entry, state, leverage } = observed;
         let (size, rows) = (size(entry).unwrap_or_default(), entry.noise.observed());
         for (side, errors) in self.0.iter_mut().enumerate() {
             let seen = rows.is_none_or(|rows| rows.get(side).copied().unwrap_or(false));
             let redundancy = 1.0 - leverage.get(side).copied().unwrap_or(1.0);
-            if let (true, Some(residual)) = (seen && redundancy > LEAST_REDUNDANCY, state.residual.get(side))
-            {
+            if let (true, Some(residual)) = (seen && redundancy > MIN_REDUNDANCY, state.residual.get(side)) {
                 errors.push(SideError { error: residual / redundancy.sqrt(), size: size[side % 2] });
             }
         }
@@ -119,7 +118,7 @@ impl Errors {
 }
 
 /// Returns the name of the group of an object's boxes.
-pub(super) fn group(object: &MappedObject, by: BoxGroups) -> String {
+pub(super) fn group_name(object: &MappedObject, by: BoxGroups) -> String {
     match by {
         BoxGroups::All | BoxGroups::Given => "all".to_owned(),
         BoxGroups::Class => {
@@ -134,13 +133,13 @@ pub(super) fn group(object: &MappedObject, by: BoxGroups) -> String {
 /// log-normal σ).
 pub(super) fn components(
     mapping: &Mapping,
-    boxes: &IndexMap<Key, Errors>,
+    boxes: &IndexMap<Key, BoxErrors>,
     settings: &VarianceSettings,
 ) -> IndexMap<String, BoxComponent> {
     let mut groups: IndexMap<String, Vec<&[SideError]>> = IndexMap::new();
     for object in mapping.mapped().filter(|_| settings.boxes != BoxGroups::Given) {
-        let Some(Errors(errors)) = boxes.get(&object.key) else { continue };
-        let series = groups.entry(group(object, settings.boxes)).or_default();
+        let Some(BoxErrors(errors)) = boxes.get(&object.key) else { continue };
+        let series = groups.entry(group_name(object, settings.boxes)).or_default();
         series.extend(errors.iter().map(Vec::as_slice));
     }
     let all: Vec<&[SideError]> = groups.values().flatten().copied().collect();
@@ -149,20 +148,21 @@ pub(super) fn components(
         return groups.into_keys().map(|name| (name, of_all)).collect();
     }
     let own = groups.values().map(|series| {
-        let relative = median(series.iter().copied().flatten().map(|e| (e.error / of_all.at(e.size)).abs()));
+        let relative =
+            median(series.iter().copied().flatten().map(|e| (e.error / of_all.sigma_at(e.size)).abs()));
         let rows = series.iter().map(|errors| errors.len()).sum::<usize>() as f64;
         // a group without errors has no information
         let relative = relative.map(f64::ln).filter(|log| log.is_finite());
         relative.map_or((0.0, 0.0), |log| (log, rows / of_all.correlation_time))
     });
-    let factors = shrunk(&own.collect::<Vec<_>>());
+    let factors = shrink_to_mean(&own.collect::<Vec<_>>());
     groups.into_keys().zip(factors).map(|(name, by)| (name, of_all.scaled(by.exp()))).collect()
 }
 
 /// Shrinks logarithms of standard deviations, each from a number of samples, towards their mean. The
 /// shrinkage is stronger if their spread is explained by chance. An entry without samples gets the mean. The
 /// spread is estimated as by DerSimonian and Laird (*Meta-analysis in Clinical Trials*, 1986).
-fn shrunk(own: &[(f64, f64)]) -> Vec<f64> {
+fn shrink_to_mean(own: &[(f64, f64)]) -> Vec<f64> {
     let variance = |deviates: f64| MEDIAN_VARIANCE / deviates.max(1.0);
     let known = || own.iter().filter(|(_, deviates)| *deviates > 0.0);
     let mean = |spread: f64| {
@@ -199,7 +199,7 @@ fn component(series: &[&[SideError]], settings: &VarianceSettings) -> Option<Box
     if !(white.is_finite() && white > 0.0) {
         return None;
     }
-    let (sigma_px, of_size) = settings.size.then(|| grown(&errors)).flatten().unwrap_or((white, 0.0));
+    let (sigma_px, of_size) = settings.size.then(|| fit_growth(&errors)).flatten().unwrap_or((white, 0.0));
     let size = errors.iter().map(|e| e.size).sum::<f64>() / errors.len() as f64;
     let one = BoxComponent::of(sigma_px, of_size, 1.0, size);
     if !settings.correlation {
@@ -207,11 +207,11 @@ fn component(series: &[&[SideError]], settings: &VarianceSettings) -> Option<Box
     }
     // gross errors are detections of something else, not correlated noise
     let within = |errors: &&[SideError]| -> Vec<SideError> {
-        errors.iter().filter(|e| e.error.abs() < 3.0 * one.at(e.size)).copied().collect()
+        errors.iter().filter(|e| e.error.abs() < 3.0 * one.sigma_at(e.size)).copied().collect()
     };
     let within: Vec<Vec<SideError>> = series.iter().map(within).collect();
     // without growth the errors stay in pixels, which keeps the result bit-identical
-    let in_units = |e: &SideError| if of_size > 0.0 { e.error / one.at(e.size) } else { e.error };
+    let in_units = |e: &SideError| if of_size > 0.0 { e.error / one.sigma_at(e.size) } else { e.error };
     let errors: Vec<Vec<f64>> = within.iter().map(|series| series.iter().map(in_units).collect()).collect();
     let time = autocorrelation_time(&errors);
     Some(BoxComponent::of(sigma_px, of_size, time, size))
@@ -219,10 +219,10 @@ fn component(series: &[&[SideError]], settings: &VarianceSettings) -> Option<Box
 
 /// Fits σ² = σ₀² + κ² size² to medians over bins of similar size. Returns σ₀ and κ; `None` for too few
 /// errors.
-fn grown(errors: &[SideError]) -> Option<(f64, f64)> {
+fn fit_growth(errors: &[SideError]) -> Option<(f64, f64)> {
     let mut sorted: Vec<SideError> = errors.iter().filter(|e| e.size > 0.0).copied().collect();
     sorted.sort_by(|a, b| a.size.total_cmp(&b.size));
-    let parts = PARTS.min(sorted.len() / LEAST_OF_PART);
+    let parts = MAX_BINS.min(sorted.len() / MIN_BIN_ERRORS);
     if parts < 2 {
         return None;
     }
@@ -237,7 +237,7 @@ fn grown(errors: &[SideError]) -> Option<(f64, f64)> {
     let (w, x, y) = (sum(|p| p.2), sum(|p| p.2 * p.0), sum(|p| p.2 * p.1));
     let (xx, xy) = (sum(|p| p.2 * p.0 * p.0), sum(|p| p.2 * p.0 * p.1));
     // equal sizes do not determine the slope
-    if points.len() < 2 || w * xx - x * x <= ALIKE * w * xx {
+    if points.len() < 2 || w * xx - x * x <= EQUAL_SIZE_VARIANCE * w * xx {
         return None;
     }
     let slope = (w * xy - x * y) / (w * xx - x * x);
@@ -274,16 +274,16 @@ mod tests {
 
     #[test]
     fn what_grows_with_size_is_told_from_what_does_not() {
-        let (sigma, of_size) = grown(&errors(20_000, 2.0, 0.04, 1)).unwrap();
+        let (sigma, of_size) = fit_growth(&errors(20_000, 2.0, 0.04, 1)).unwrap();
         assert!((sigma - 2.0).abs() < 0.3 && (of_size - 0.04).abs() < 0.003, "{sigma} {of_size}");
-        let (sigma, of_size) = grown(&errors(20_000, 2.0, 0.0, 2)).unwrap();
+        let (sigma, of_size) = fit_growth(&errors(20_000, 2.0, 0.0, 2)).unwrap();
         assert!((sigma - 2.0).abs() < 0.1 && of_size < 0.003, "{sigma} {of_size}");
-        let (sigma, of_size) = grown(&errors(20_000, 0.0, 0.04, 3)).unwrap();
+        let (sigma, of_size) = fit_growth(&errors(20_000, 0.0, 0.04, 3)).unwrap();
         assert!(sigma < 0.5 && (of_size - 0.04).abs() < 0.003, "{sigma} {of_size}");
-        assert_eq!(grown(&errors(30, 2.0, 0.04, 4)), None);
+        assert_eq!(fit_growth(&errors(30, 2.0, 0.04, 4)), None);
         let alike: Vec<_> =
             errors(1000, 2.0, 0.04, 5).into_iter().map(|e| SideError { size: 80.0, ..e }).collect();
-        assert_eq!(grown(&alike), None);
+        assert_eq!(fit_growth(&alike), None);
     }
 
     #[test]
@@ -292,22 +292,22 @@ mod tests {
         let plain = component(&[&errors], &settings(false)).unwrap();
         assert_eq!((plain.of_size, plain.effective_px), (0.0, plain.sigma_px));
         let grown = component(&[&errors], &settings(true)).unwrap();
-        let [x, y] = [100.0, 200.0].map(|size| grown.at(size));
+        let [x, y] = [100.0, 200.0].map(|size| grown.sigma_at(size));
         assert_eq!(grown.noise(Some([100.0, 200.0])).unwrap(), Noise::sigmas(&[x, y, x, y]).unwrap());
         assert!(y > 1.5 * x, "{x} {y}");
     }
 
     #[test]
     fn groups_of_few_are_drawn_towards_all_and_those_of_many_are_not() {
-        let many = shrunk(&[(-0.5, 1e6), (0.5, 1e6), (0.0, 1e6)]);
+        let many = shrink_to_mean(&[(-0.5, 1e6), (0.5, 1e6), (0.0, 1e6)]);
         assert!((many[0] + 0.5).abs() < 1e-3 && (many[1] - 0.5).abs() < 1e-3, "{many:?}");
-        let mixed = shrunk(&[(-0.5, 1e6), (0.5, 10.0), (0.0, 1e6)]);
+        let mixed = shrink_to_mean(&[(-0.5, 1e6), (0.5, 10.0), (0.0, 1e6)]);
         assert!((mixed[0] + 0.5).abs() < 1e-3 && (0.05..0.3).contains(&mixed[1]), "{mixed:?}");
         // differences explained by chance vanish
-        assert_eq!(shrunk(&[(-0.1, 10.0), (0.1, 10.0)]), [0.0, 0.0]);
+        assert_eq!(shrink_to_mean(&[(-0.1, 10.0), (0.1, 10.0)]), [0.0, 0.0]);
         // groups of few samples do not move a well-known one, and an empty group gets the mean
-        let found = shrunk(&[(0.0, 400.0), (-0.7, 2.0), (-0.6, 2.0), (0.0, 0.0)]);
+        let found = shrink_to_mean(&[(0.0, 400.0), (-0.7, 2.0), (-0.6, 2.0), (0.0, 0.0)]);
         assert!(found.iter().all(|log| log.abs() < 0.02), "{found:?}");
-        assert_eq!(shrunk(&[]), Vec::<f64>::new());
+        assert_eq!(shrink_to_mean(&[]), Vec::<f64>::new());
     }
 }

@@ -1,5 +1,5 @@
 //! The noise of each group of measurements.
-use super::boxes::{self, BoxComponent, Errors, Observed, box_of, group};
+use super::boxes::{self, BoxComponent, BoxErrors, ObservedBox, box_of, group_name};
 use super::cross_validation::CrossValidation;
 use super::motion::{self, MotionChoice};
 use super::{BoxGroups, VarianceSettings};
@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 /// The estimated noise of odometry and boxes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Components {
+pub struct VarianceComponents {
     /// Noise of odometry; `None` if it stays as given.
     pub odometry: Option<MotionChoice>,
     /// Noise of boxes, by group.
@@ -45,25 +45,25 @@ pub enum VarianceError {
 }
 
 /// Kind of measurement of a factor.
-pub(super) enum Measures {
+pub(super) enum MeasurementOf {
     Motion,
     Box { object: Key },
     Other,
 }
 
 /// Initial standard deviation of boxes, in pixels.
-const BEGIN_PX: f64 = 10.0;
+const INITIAL_SIGMA_PX: f64 = 10.0;
 /// Relative change of the box noise above which the noise of odometry is chosen again.
-const SAME_BOXES: f64 = 0.2;
+const MAX_BOX_NOISE_CHANGE: f64 = 0.2;
 
-impl Components {
+impl VarianceComponents {
     /// Returns the noise before the first round. It does not depend on the run document.
-    pub(in crate::estimate) fn begin(mapping: &Mapping, settings: &VarianceSettings) -> Self {
-        let component = BoxComponent::of(BEGIN_PX, 0.0, 1.0, 0.0);
+    pub(in crate::estimate) fn initial(mapping: &Mapping, settings: &VarianceSettings) -> Self {
+        let component = BoxComponent::of(INITIAL_SIGMA_PX, 0.0, 1.0, 0.0);
         let boxes = mapping.mapped().filter(|_| settings.boxes != BoxGroups::Given);
-        let boxes = boxes.map(|object| (group(object, settings.boxes), component)).collect();
+        let boxes = boxes.map(|object| (group_name(object, settings.boxes), component)).collect();
         let is_chosen = settings.odometry && CrossValidation::is_possible(mapping);
-        Self { odometry: is_chosen.then(MotionChoice::begin), boxes }
+        Self { odometry: is_chosen.then(MotionChoice::initial), boxes }
     }
 
     /// Estimates the noise: of boxes from their residuals, of odometry by cross-validation with left-out
@@ -71,7 +71,7 @@ impl Components {
     ///
     /// # Errors
     /// If the estimate has no covariance.
-    pub fn of(
+    pub fn estimate_from(
         estimate: &Estimate,
         settings: &VarianceSettings,
         loss: Option<&Arc<dyn Loss>>,
@@ -79,13 +79,13 @@ impl Components {
     ) -> Result<Self, VarianceError> {
         let graph = &estimate.mapping.graph;
         let leverages = estimate.solution.leverages(graph)?;
-        let mut boxes: IndexMap<Key, Errors> = IndexMap::new();
+        let mut boxes: IndexMap<Key, BoxErrors> = IndexMap::new();
         for (state, leverage) in estimate.solution.factors.iter().zip(&leverages) {
             let Some(entry) = graph.factors().get(state.entry).filter(|_| state.defined) else { continue };
             // factors are in the order of the graph, so the boxes of an object are in the order of their
             // frames
-            if let Measures::Box { object } = measures(entry) {
-                boxes.entry(object).or_default().add(&Observed { entry, state, leverage });
+            if let MeasurementOf::Box { object } = measurement_of(entry) {
+                boxes.entry(object).or_default().add(&ObservedBox { entry, state, leverage });
             }
         }
         let mut found =
@@ -96,12 +96,12 @@ impl Components {
         let before = estimate.components.last();
         let chosen = before.and_then(|before| before.odometry);
         found.odometry = chosen;
-        if before.is_none_or(|before| found.change(before) > SAME_BOXES) {
+        if before.is_none_or(|before| found.largest_change(before) > MAX_BOX_NOISE_CHANGE) {
             let mut mapping = estimate.mapping.clone();
-            found.apply(&mut mapping, settings, loss)?;
+            found.apply_to_graph(&mut mapping, settings, loss)?;
             if let Some(validation) = CrossValidation::new(&mapping, &estimate.solution.values) {
-                let pivot = if settings.pivot { motion::distance(estimate) } else { 0.0 };
-                found.odometry = motion::choose(&validation, pivot, chosen, observer)?;
+                let pivot = if settings.pivot { motion::median_distance(estimate) } else { 0.0 };
+                found.odometry = motion::choose_noise(&validation, pivot, chosen, observer)?;
             }
         }
         Ok(found)
@@ -112,7 +112,7 @@ impl Components {
     ///
     /// # Errors
     /// If a standard deviation is zero or not finite.
-    pub fn apply(
+    pub fn apply_to_graph(
         &self,
         mapping: &mut Mapping,
         settings: &VarianceSettings,
@@ -120,15 +120,15 @@ impl Components {
     ) -> Result<(), VarianceError> {
         let mut groups = HashMap::new();
         for object in mapping.mapped() {
-            if let Some(component) = self.boxes.get(&group(object, settings.boxes)) {
+            if let Some(component) = self.boxes.get(&group_name(object, settings.boxes)) {
                 let tau = Positive::new(component.correlation_time)?;
                 groups.insert(object.key.clone(), (component, loss.map(|loss| loss.erased().tempered(tau))));
             }
         }
         for entry in mapping.graph.factors_mut() {
-            let noise = match (measures(entry), self.odometry) {
-                (Measures::Motion, Some(motion)) => motion.noise.noise()?,
-                (Measures::Box { object }, _) => match groups.get(&object) {
+            let noise = match (measurement_of(entry), self.odometry) {
+                (MeasurementOf::Motion, Some(motion)) => motion.noise.noise()?,
+                (MeasurementOf::Box { object }, _) => match groups.get(&object) {
                     Some((component, loss)) => {
                         entry.loss.clone_from(loss);
                         component.noise(boxes::size(entry))?
@@ -146,7 +146,7 @@ impl Components {
     }
 
     /// Returns the largest relative change of a standard deviation of boxes.
-    pub fn change(&self, before: &Self) -> f64 {
+    pub fn largest_change(&self, before: &Self) -> f64 {
         let boxes = self.boxes.iter().filter_map(|(name, now)| {
             before.boxes.get(name).map(|before| (&now.effective_px, &before.effective_px))
         });
@@ -155,13 +155,13 @@ impl Components {
 }
 
 /// Returns the kind of measurement of a factor. Odometry is a factor between the poses of consecutive frames.
-pub(super) fn measures(entry: &FactorEntry) -> Measures {
+pub(super) fn measurement_of(entry: &FactorEntry) -> MeasurementOf {
     let pose = TypeId::of::<Se3>();
     let are_poses = || entry.factor.erased().signature().variables.iter().all(|variable| *variable == pose);
     match &entry.keys[..] {
-        [from, to] if are_consecutive(from, to) && are_poses() => Measures::Motion,
-        [_, object, ..] if box_of(entry).is_some() => Measures::Box { object: object.clone() },
-        _ => Measures::Other,
+        [from, to] if are_consecutive(from, to) && are_poses() => MeasurementOf::Motion,
+        [_, object, ..] if box_of(entry).is_some() => MeasurementOf::Box { object: object.clone() },
+        _ => MeasurementOf::Other,
     }
 }
 
@@ -184,7 +184,7 @@ mod tests {
             noise: Noise::default(),
             loss: None,
         };
-        matches!(measures(&entry), Measures::Motion)
+        matches!(measurement_of(&entry), MeasurementOf::Motion)
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! Correlation time of errors.
 
 /// Longest lag.
-const LONGEST: usize = 300;
+const MAX_LAG: usize = 300;
 /// Window of the sum, in multiples of τ (Sokal, Monte Carlo Methods in Statistical Mechanics, 1996).
-const WINDOW: f64 = 5.0;
+const WINDOW_TAUS: f64 = 5.0;
 
 /// Returns the integrated autocorrelation time τ = 1 + 2 Σ ρₖ of series of errors around zero, at least 1.
 /// The mean of n such errors has τ times the variance of the mean of independent errors. All series are
@@ -21,10 +21,10 @@ pub(super) fn autocorrelation_time(series: &[Vec<f64>]) -> f64 {
     };
     let power = product(0);
     let mut tau = 1.0;
-    for lag in 1..=LONGEST {
+    for lag in 1..=MAX_LAG {
         let share = product(lag) / power;
         // beyond the window, the sum would only add noise
-        if !(share > 0.0 && lag as f64 <= WINDOW * tau) {
+        if !(share > 0.0 && lag as f64 <= WINDOW_TAUS * tau) {
             break;
         }
         tau += 2.0 * share;

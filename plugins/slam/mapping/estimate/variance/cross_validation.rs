@@ -5,8 +5,8 @@
 //! follows detector errors of some objects does not, because these errors differ between objects. This needs
 //! neither ground truth nor the size of the box noise.
 use super::MotionComponent;
-use super::components::{Measures, VarianceError, measures};
-use crate::estimate::refine::{alone, roughly};
+use super::components::{MeasurementOf, VarianceError, measurement_of};
+use crate::estimate::refine::{coarse_solver, object_graph};
 use crate::mapping::Mapping;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::NotNegative;
@@ -19,30 +19,30 @@ use serde::Serialize;
 /// Number of folds. Each is left out once.
 const FOLDS: usize = 5;
 /// Smallest number of objects for a cross-validation.
-const LEAST_OBJECTS: usize = 4;
+const MIN_OBJECTS: usize = 4;
 /// Significance threshold in standard errors. It is high because the best of about twenty candidates is
 /// selected.
-const CLEAR: f64 = 2.0;
-/// A solve ends after this number of iterations, or at the relative decrease `SETTLED` of the cost: scores
+const SIGNIFICANCE_SIGMAS: f64 = 2.0;
+/// A solve ends after this number of iterations, or at the relative decrease `MIN_RELATIVE_DECREASE` of the cost: scores
 /// differ by whole nats.
-const ITERATIONS: usize = 10;
-const SETTLED: f64 = 1e-4;
+const MAX_ITERATIONS: usize = 10;
+const MIN_RELATIVE_DECREASE: f64 = 1e-4;
 /// Cost of a box whose object is not visible from its pose, in nats.
-const LOST: f64 = 50.0;
+const INVISIBLE_COST_NATS: f64 = 50.0;
 
 /// Cross-validation score of an odometry noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Score {
+pub struct CrossValidationScore {
     /// Cost of the boxes of left-out objects minus their cost under the input odometry, in nats.
     pub cost: f64,
     /// Standard error of the cost, from its spread over objects.
     pub deviation: f64,
 }
 
-impl Score {
+impl CrossValidationScore {
     /// Returns whether the trajectory is significantly better than the odometry.
     pub fn is_better(&self) -> bool {
-        self.cost < -CLEAR * self.deviation
+        self.cost < -SIGNIFICANCE_SIGMAS * self.deviation
     }
 }
 
@@ -58,11 +58,11 @@ struct Fold {
     /// Indices of the motion factors.
     motions: Vec<usize>,
     start: Values,
-    left_out: Vec<LeftOut>,
+    left_out: Vec<LeftOutObject>,
 }
 
 /// An object with its factors and the cost of its boxes under the input odometry.
-struct LeftOut {
+struct LeftOutObject {
     key: Key,
     entries: Vec<FactorEntry>,
     before: f64,
@@ -71,7 +71,7 @@ struct LeftOut {
 impl<'a> CrossValidation<'a> {
     /// Returns whether there are enough objects.
     pub(super) fn is_possible(mapping: &Mapping) -> bool {
-        mapping.mapped().count() >= LEAST_OBJECTS
+        mapping.mapped().count() >= MIN_OBJECTS
     }
 
     /// Creates the folds of a map with known box noise. `values` are close to the estimate. `None` for too
@@ -87,13 +87,13 @@ impl<'a> CrossValidation<'a> {
             let is_left_out = |key: &Key| names.contains(&key);
             graph.factors_mut().retain(|entry| !entry.keys.iter().any(is_left_out));
             let motions = graph.factors().iter().enumerate();
-            let motions = motions.filter(|(_, entry)| matches!(measures(entry), Measures::Motion));
+            let motions = motions.filter(|(_, entry)| matches!(measurement_of(entry), MeasurementOf::Motion));
             let motions = motions.map(|(place, _)| place).collect();
             let mut start = values.clone();
             for (key, _) in values.iter().filter(|(key, _)| is_left_out(key)) {
                 start.remove(key.as_str());
             }
-            let left_out = names.iter().map(|key| LeftOut::new(key, mapping, values)).collect();
+            let left_out = names.iter().map(|key| LeftOutObject::new(key, mapping, values)).collect();
             Fold { graph, motions, start, left_out }
         };
         Some(Self { values, folds: (0..FOLDS.min(keys.len())).into_par_iter().map(fold).collect() })
@@ -103,7 +103,10 @@ impl<'a> CrossValidation<'a> {
     ///
     /// # Errors
     /// If the graph of a fold cannot be compiled.
-    pub(super) fn scores(&self, tried: &[MotionComponent]) -> Result<Vec<Score>, VarianceError> {
+    pub(super) fn scores(
+        &self,
+        tried: &[MotionComponent],
+    ) -> Result<Vec<CrossValidationScore>, VarianceError> {
         let tasks: Vec<(&MotionComponent, &Fold)> =
             tried.iter().flat_map(|motion| self.folds.iter().map(move |fold| (motion, fold))).collect();
         let gains = tasks.par_iter().map(|(motion, fold)| fold.gains(motion, self.values));
@@ -113,11 +116,11 @@ impl<'a> CrossValidation<'a> {
 }
 
 /// Returns the sum and its standard error.
-fn score(costs: &[f64]) -> Score {
+fn score(costs: &[f64]) -> CrossValidationScore {
     let n = costs.len() as f64;
     let cost: f64 = costs.iter().sum();
     let squares: f64 = costs.iter().map(|one| (one - cost / n).powi(2)).sum();
-    Score { cost, deviation: (squares / (n - 1.0) * n).sqrt() }
+    CrossValidationScore { cost, deviation: (squares / (n - 1.0) * n).sqrt() }
 }
 
 impl Fold {
@@ -128,15 +131,19 @@ impl Fold {
         for place in &self.motions {
             factors[*place].noise = noise.clone();
         }
-        let poses =
-            solve(&graph, &self.start, &roughly(ITERATIONS, NotNegative::literal(SETTLED)), &mut Silent)?
-                .values;
+        let poses = solve(
+            &graph,
+            &self.start,
+            &coarse_solver(MAX_ITERATIONS, NotNegative::literal(MIN_RELATIVE_DECREASE)),
+            &mut Silent,
+        )?
+        .values;
         let gains = self.left_out.iter().map(|object| Ok(object.cost(&poses, shapes)? - object.before));
         gains.collect()
     }
 }
 
-impl LeftOut {
+impl LeftOutObject {
     fn new(key: &Key, mapping: &Mapping, shapes: &Values) -> Self {
         let is_alone = |entry: &&FactorEntry| {
             let others = || entry.keys.iter().filter(|other| *other != key);
@@ -153,16 +160,17 @@ impl LeftOut {
     /// objects.
     fn cost(&self, poses: &Values, shapes: &Values) -> Result<f64, CompileError> {
         let Ok(shape) = shapes.get::<DualQuadric>(&self.key) else { return Ok(0.0) };
-        let (graph, values) = alone(&self.key, *shape, self.entries.iter(), poses);
+        let (graph, values) = object_graph(&self.key, *shape, self.entries.iter(), poses);
         let mut problem = Problem::compile(&graph, &values)?;
-        roughly(ITERATIONS, NotNegative::literal(SETTLED)).descend(&mut problem, &mut Silent);
+        coarse_solver(MAX_ITERATIONS, NotNegative::literal(MIN_RELATIVE_DECREASE))
+            .descend(&mut problem, &mut Silent);
         let states = problem.inspect();
         let boxes = states.iter().filter(|state| {
             let entry = self.entries.get(state.entry);
-            entry.is_some_and(|entry| matches!(measures(entry), Measures::Box { .. }))
+            entry.is_some_and(|entry| matches!(measurement_of(entry), MeasurementOf::Box { .. }))
         });
-        let costs = boxes.map(|state| if state.defined { state.cost } else { LOST });
+        let costs = boxes.map(|state| if state.defined { state.cost } else { INVISIBLE_COST_NATS });
         // a cost that is not finite counts as an invisible object
-        Ok(costs.map(|cost| if cost.is_finite() { cost } else { LOST }).sum())
+        Ok(costs.map(|cost| if cost.is_finite() { cost } else { INVISIBLE_COST_NATS }).sum())
     }
 }

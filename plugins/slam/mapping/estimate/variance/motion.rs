@@ -1,7 +1,7 @@
 //! Noise of odometry, and the search for it.
 use super::components::VarianceError;
-use super::cross_validation::{CrossValidation, Score};
-use crate::estimate::{Estimate, Landmark};
+use super::cross_validation::{CrossValidation, CrossValidationScore};
+use crate::estimate::{Estimate, LandmarkEstimate};
 use crate::mapping::pose_key;
 use manifactor_geometry::Se3;
 use manifactor_graph::Noise;
@@ -32,13 +32,13 @@ pub struct MotionChoice {
     /// Noise in the graph: almost zero if the odometry is kept.
     pub noise: MotionComponent,
     /// Score of the best noise. The odometry is kept unless the score is significant.
-    pub score: Score,
+    pub score: CrossValidationScore,
     #[serde(skip)]
-    place: Place,
+    place: GridPoint,
 }
 
 /// Noise that leaves the odometry unchanged, in rad and m.
-const KEPT: f64 = 1e-5;
+const UNCHANGED_SIGMA: f64 = 1e-5;
 
 impl MotionComponent {
     /// Returns the noise of the residual (ω, v) of a motion, in the frame of the later camera: v = p × ω + ε
@@ -66,26 +66,30 @@ impl MotionComponent {
 
 impl MotionChoice {
     /// Returns the choice before the search.
-    pub(super) fn begin() -> Self {
-        Self { noise: component(BEGIN, 0.0), score: Score { cost: 0.0, deviation: 0.0 }, place: BEGIN }
+    pub(super) fn initial() -> Self {
+        Self {
+            noise: component(SEARCH_START, 0.0),
+            score: CrossValidationScore { cost: 0.0, deviation: 0.0 },
+            place: SEARCH_START,
+        }
     }
 
     /// Returns whether the input odometry is kept.
-    pub fn is_kept(&self) -> bool {
+    pub fn keeps_input(&self) -> bool {
         !self.score.is_better()
     }
 }
 
 /// A point of the search grid: both standard deviations in half decades relative to 1e-3, and whether there
 /// is a pivot.
-type Place = (i32, i32, bool);
+type GridPoint = (i32, i32, bool);
 
 /// Start of the search: 1e-3 rad and 1e-3 m, independent of the run document.
-const BEGIN: Place = (0, 0, false);
+const SEARCH_START: GridPoint = (0, 0, false);
 /// Limits of the grid: 1e-5 and 1.
-const ENDS: [i32; 2] = [-4, 6];
+const GRID_LIMITS: [i32; 2] = [-4, 6];
 
-fn component((turn, shift, turns): Place, pivot: f64) -> MotionComponent {
+fn component((turn, shift, turns): GridPoint, pivot: f64) -> MotionComponent {
     let sigma = |half_decades: i32| 10f64.powf(-3.0 + 0.5 * f64::from(half_decades));
     MotionComponent {
         rotation: sigma(turn),
@@ -95,20 +99,20 @@ fn component((turn, shift, turns): Place, pivot: f64) -> MotionComponent {
 }
 
 /// State of the grid search.
-struct Search<'a> {
+struct GridSearch<'a> {
     observer: &'a mut dyn Observer,
     validation: &'a CrossValidation<'a>,
     pivot: f64,
-    scores: BTreeMap<Place, Score>,
+    scores: BTreeMap<GridPoint, CrossValidationScore>,
 }
 
-impl Search<'_> {
-    fn try_all(&mut self, places: impl Iterator<Item = Place>) -> Result<(), VarianceError> {
+impl GridSearch<'_> {
+    fn try_all(&mut self, places: impl Iterator<Item = GridPoint>) -> Result<(), VarianceError> {
         if self.observer.poll().is_break() {
             return Ok(());
         }
-        let is_inside = |at: i32| (ENDS[0]..=ENDS[1]).contains(&at);
-        let new: Vec<Place> = places
+        let is_inside = |at: i32| (GRID_LIMITS[0]..=GRID_LIMITS[1]).contains(&at);
+        let new: Vec<GridPoint> = places
             .filter(|place| is_inside(place.0) && is_inside(place.1) && !self.scores.contains_key(place))
             .collect();
         let components: Vec<_> = new.iter().map(|place| component(*place, self.pivot)).collect();
@@ -116,7 +120,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    fn best(&self) -> Option<(Place, Score)> {
+    fn best(&self) -> Option<(GridPoint, CrossValidationScore)> {
         // the first of equal ones
         let best = self.scores.iter().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
         best.map(|(place, score)| (*place, *score))
@@ -138,9 +142,9 @@ impl Search<'_> {
 }
 
 /// Returns the median distance of objects from the camera over all boxes, in metres.
-pub(super) fn distance(estimate: &Estimate) -> f64 {
+pub(super) fn median_distance(estimate: &Estimate) -> f64 {
     let (values, measurements) = (&estimate.solution.values, &estimate.mapping.measurements);
-    let of_object = |landmark: Landmark<'_>| {
+    let of_object = |landmark: LandmarkEstimate<'_>| {
         let views = measurements.object(landmark.object.id).map_or(&[][..], |measured| &measured.views);
         let poses = views.iter().filter_map(|view| values.get::<Se3>(pose_key(view.frame)).ok());
         poses.map(|pose| (pose.translation - landmark.quadric.centroid()).norm()).collect::<Vec<_>>()
@@ -156,21 +160,21 @@ pub(super) fn distance(estimate: &Estimate) -> f64 {
 ///
 /// # Errors
 /// If the graph of a fold cannot be compiled.
-pub(super) fn choose(
+pub(super) fn choose_noise(
     validation: &CrossValidation<'_>,
     pivot: f64,
     before: Option<MotionChoice>,
     observer: &mut dyn Observer,
 ) -> Result<Option<MotionChoice>, VarianceError> {
-    let mut search = Search { observer, validation, pivot, scores: BTreeMap::new() };
-    let begin = before.map_or(BEGIN, |before| before.place);
+    let mut search = GridSearch { observer, validation, pivot, scores: BTreeMap::new() };
+    let begin = before.map_or(SEARCH_START, |before| before.place);
     search.try_all([begin].into_iter())?;
     if before.is_none() {
         search.descend(2)?;
     }
     search.descend(1)?;
     let chosen = search.best().map(|(place, score)| {
-        let kept = MotionComponent { rotation: KEPT, translation: KEPT, pivot: 0.0 };
+        let kept = MotionComponent { rotation: UNCHANGED_SIGMA, translation: UNCHANGED_SIGMA, pivot: 0.0 };
         let noise = if score.is_better() { component(place, pivot) } else { kept };
         MotionChoice { noise, score, place }
     });

@@ -3,10 +3,10 @@
 //! A pose predicts boxes. Boxes of matched objects should lie on the projections of the prior ellipsoids.
 //! Other prior objects in view should be detected too: in a different room, a few objects may stand as in the
 //! map, but the rest is missing.
-use super::layout::{Aligned, Layout};
+use super::layout::{AlignedLayout, Layout};
 use crate::mapper::Mapper;
 use manifactor_geometry::Se3;
-use manifactor_mapping::estimate::looks::{Expected, Sight, sights};
+use manifactor_mapping::estimate::looks::{ExpectedObject, VisibleObject, visit_visible_objects};
 use manifactor_mapping::mapping::measurements::ObjectBox;
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, DualQuadric};
 use manifactor_recording::prior_map::{PriorMap, PriorObject};
@@ -24,41 +24,46 @@ pub(super) struct Agreement {
 }
 
 /// Agreement at which a pose is accepted. Chosen on the streams listed in `docs/decisions/prior-maps.md`.
-const BELIEVED: f64 = 0.45;
+const MIN_AGREEMENT: f64 = 0.45;
 /// Agreement at which a pose counts as a rival of the best one.
-const POSSIBLE: f64 = 0.3;
+const MIN_RIVAL_AGREEMENT: f64 = 0.3;
 
 impl Agreement {
     /// Returns the overlap times the detected share: an undetected object counts as no overlap.
-    fn whole(self) -> f64 {
+    fn score(self) -> f64 {
         self.overlap * self.seen
     }
 
     /// Returns whether the agreement is good enough to accept a pose.
-    pub(super) fn is_believed(self) -> bool {
-        self.whole() >= BELIEVED
+    pub(super) fn is_accepted(self) -> bool {
+        self.score() >= MIN_AGREEMENT
     }
 }
 
 /// Number of boxes per object that are compared with projections, at most.
-const BOXES: usize = 20;
+const MAX_COMPARED_BOXES: usize = 20;
 /// Number of last frames that are searched for prior objects.
-const FRAMES: usize = 300;
+const SEARCHED_FRAMES: usize = 300;
 /// Intersection over union at which a box shows a prior object.
-const SHOWN: f64 = 0.3;
+const MIN_SHOWN_IOU: f64 = 0.3;
 
 impl Mapper {
     /// Returns the agreement of boxes with a pose; `None` if it is too low for any pose.
-    pub(super) fn agreement(&self, aligned: &Aligned, layout: &Layout, map: &PriorMap) -> Option<Agreement> {
-        let overlap = Some(self.overlap(aligned, map)).filter(|overlap| *overlap >= POSSIBLE)?;
-        let seen = self.seen(&aligned.known_from_local, layout, map);
-        Some(Agreement { overlap, seen }).filter(|agreement| agreement.whole() >= POSSIBLE)
+    pub(super) fn agreement(
+        &self,
+        aligned: &AlignedLayout,
+        layout: &Layout,
+        map: &PriorMap,
+    ) -> Option<Agreement> {
+        let overlap = Some(self.overlap(aligned, map)).filter(|overlap| *overlap >= MIN_RIVAL_AGREEMENT)?;
+        let seen = self.detected_share(&aligned.known_from_local, layout, map);
+        Some(Agreement { overlap, seen }).filter(|agreement| agreement.score() >= MIN_RIVAL_AGREEMENT)
     }
 
-    fn overlap(&self, aligned: &Aligned, map: &PriorMap) -> f64 {
+    fn overlap(&self, aligned: &AlignedLayout, map: &PriorMap) -> f64 {
         let of_pair = |(local, known): &(ObjectId, ObjectId)| {
             let (measured, object) = (self.measured(*local)?, map.object(*known)?);
-            let every = measured.views.len().div_ceil(BOXES).max(1);
+            let every = measured.views.len().div_ceil(MAX_COMPARED_BOXES).max(1);
             let overlaps = measured.views.iter().step_by(every).filter_map(|view| {
                 let pose = aligned.known_from_local.compose(&self.pose(view.frame)?);
                 let outline = self.outline(&pose, &object.quadric, view);
@@ -71,20 +76,21 @@ impl Mapper {
 
     /// Returns the detected share of the prior objects at a pose. The expected number is the sum of the
     /// detection rates over all opportunities.
-    fn seen(&self, place: &Se3, layout: &Layout, map: &PriorMap) -> f64 {
-        let expected = |object: &PriorObject| Expected::new(object.id, object.quadric, object.least_px);
-        let objects: Vec<Expected> = map.objects.iter().map(|object| expected(object)).collect();
-        let frames = self.live.iter().enumerate().skip(self.live.len().saturating_sub(FRAMES));
+    fn detected_share(&self, place: &Se3, layout: &Layout, map: &PriorMap) -> f64 {
+        let expected = |object: &PriorObject| ExpectedObject::new(object.id, object.quadric, object.least_px);
+        let objects: Vec<ExpectedObject> = map.objects.iter().map(|object| expected(object)).collect();
+        let frames =
+            self.live_poses.iter().enumerate().skip(self.live_poses.len().saturating_sub(SEARCHED_FRAMES));
         let poses = frames
             .filter_map(|(frame, live)| Some((frame, live.timestamp, place.compose(&self.pose_of(frame)?))));
         let (mut expected, mut seen) = (0.0, 0.0);
         // objects detected in the current opportunity
         let mut is_seen = BTreeSet::new();
         let border = self.settings.detections.border_px;
-        sights(&objects, poses, &self.camera, *border, |sight| {
+        visit_visible_objects(&objects, poses, &self.camera, *border, |sight| {
             let Some(object) = map.object(sight.id) else { return };
             if sight.begins {
-                expected += object.looks.rate();
+                expected += object.looks.detection_rate();
                 is_seen.remove(&sight.id);
             }
             if !is_seen.contains(&sight.id) && self.is_shown(&sight, object, layout) {
@@ -97,12 +103,12 @@ impl Mapper {
     }
 
     /// Returns whether a visible prior object has a matching box.
-    fn is_shown(&self, sight: &Sight, object: &PriorObject, layout: &Layout) -> bool {
-        layout.may_be(object.id).any(|local| {
+    fn is_shown(&self, sight: &VisibleObject, object: &PriorObject, layout: &Layout) -> bool {
+        layout.possible_matches(object.id).any(|local| {
             let view = self.measured(local).and_then(|measured| measured.view(sight.frame));
             view.is_some_and(|view| {
                 let outline = self.outline(&sight.pose, &object.quadric, view);
-                outline.is_some_and(|outline| outline.iou(&view.bounding_box) >= SHOWN)
+                outline.is_some_and(|outline| outline.iou(&view.bounding_box) >= MIN_SHOWN_IOU)
             })
         })
     }

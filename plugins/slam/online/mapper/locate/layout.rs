@@ -9,7 +9,7 @@ use manifactor_geometry::{PointPairs, Se3};
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{Direction, Noise};
 use manifactor_quadric::DualQuadric;
-use manifactor_recording::fusion::Fusion;
+use manifactor_recording::fusion::ClassFusion;
 use manifactor_recording::prior_map::{PriorMap, PriorObject};
 use manifactor_recording::sequence::ObjectId;
 use nalgebra::{DMatrix, Matrix3, Vector3};
@@ -21,7 +21,7 @@ mod hypotheses;
 
 /// An object used for relocalization.
 #[derive(Debug, Clone)]
-pub(crate) struct Mark {
+pub(crate) struct LayoutObject {
     pub id: ObjectId,
     centre: Vector3<f64>,
     /// Standard deviation of the centre, in metres.
@@ -32,12 +32,12 @@ pub(crate) struct Mark {
 /// The objects of the run (local) and of the prior map (known).
 #[derive(Debug)]
 pub(crate) struct Layout {
-    local: Vec<Mark>,
-    known: Vec<Mark>,
+    local: Vec<LayoutObject>,
+    known: Vec<LayoutObject>,
     /// Up direction in both.
     up: Option<[Direction; 2]>,
     /// Pairs that may show one object.
-    pairs: Vec<Pair>,
+    pairs: Vec<CandidateMatch>,
     /// Logarithm of the volume of the known marks, in m³.
     log_volume: f64,
     /// Median distance of a known mark to its nearest neighbour.
@@ -46,7 +46,7 @@ pub(crate) struct Layout {
 
 /// A candidate match of a local and a known mark.
 #[derive(Debug, Clone, Copy)]
-struct Pair {
+struct CandidateMatch {
     local: usize,
     known: usize,
     /// Log-likelihood ratio of the match before poses are compared, in nats: from the classes, minus the
@@ -58,7 +58,7 @@ struct Pair {
 
 /// A pose of the local marks in the prior map.
 #[derive(Debug, Clone)]
-pub(crate) struct Aligned {
+pub(crate) struct AlignedLayout {
     pub known_from_local: Se3,
     /// Matched marks: local ids, known ids.
     pub matches: Vec<(ObjectId, ObjectId)>,
@@ -72,48 +72,48 @@ pub(crate) struct Aligned {
 }
 
 /// Standard deviation added to the centre of an object, relative to its mean semi-axis.
-const OF_SIZE: f64 = 0.5;
+const CENTRE_SIGMA_OF_SIZE: f64 = 0.5;
 /// Smallest similarity of the classes of matching marks (Bhattacharyya coefficient).
-const ALIKE: f64 = 0.3;
-/// Share of boxes with a random class, one of `CLASSES`.
+const MIN_CLASS_SIMILARITY: f64 = 0.3;
+/// Share of boxes with a random class, one of `CLASS_COUNT`.
 const CLASS_ERROR: f64 = 0.1;
-const CLASSES: f64 = 20.0;
+const CLASS_COUNT: f64 = 20.0;
 /// Distance of matching marks, at most, in standard deviations.
-const GATE: f64 = 3.0;
+const MAX_MATCH_SIGMA: f64 = 3.0;
 /// Cost of a local mark inside the prior map without a match, in nats.
-const NEW: f64 = 1.6;
+const UNMATCHED_COST: f64 = 1.6;
 /// Number of distinct hypotheses that are refined.
-const LOOKED_AT: usize = 40;
+const MAX_REFINED_HYPOTHESES: usize = 40;
 /// Rounds that alternate between matching and pose estimation.
-const ROUNDS: usize = 5;
+const MATCHING_ROUNDS: usize = 5;
 /// Two poses count as one if each mark moves by less than this, in units of twice its σ.
-const SAME: f64 = 3.0;
+const SAME_POSE_SIGMA: f64 = 3.0;
 /// Required number of matches.
-const MATCHES: usize = 4;
+const MIN_MATCHES: usize = 4;
 /// Required share of matches among the local marks inside the prior map.
-const MOST: f64 = 0.6;
+const MIN_MATCHED_SHARE: f64 = 0.6;
 /// Required lead over the second best pose, in nats. Chosen on the streams listed in
 /// `docs/decisions/prior-maps.md`.
-const LEAD: f64 = 12.0;
+const MIN_LEAD_NATS: f64 = 12.0;
 
 /// Weight of the up direction relative to all marks together.
-const UP: f64 = 10.0;
+const UP_WEIGHT: f64 = 10.0;
 /// Standard deviation of the tilt, in radians. With equal σ in all directions, the trajectory tilted by up to
 /// 13° on fr1 (`docs/decisions/prior-maps.md`).
-const TILT: f64 = 0.01;
+const TILT_SIGMA_RAD: f64 = 0.01;
 /// Relative spread of the marks below which a direction is undetermined.
-const FLAT: f64 = 1e-3;
+const MIN_RELATIVE_SPREAD: f64 = 1e-3;
 
-impl Mark {
+impl LayoutObject {
     /// Creates a mark. `variance` is the variance of the centre, the mean over three directions, in m².
-    pub(crate) fn new(id: ObjectId, quadric: &DualQuadric, variance: f64, classes: &Fusion) -> Self {
+    pub(crate) fn new(id: ObjectId, quadric: &DualQuadric, variance: f64, classes: &ClassFusion) -> Self {
         let size = quadric.semi_axes.mean();
-        let sigma = (variance + (OF_SIZE * size).powi(2)).sqrt();
+        let sigma = (variance + (CENTRE_SIGMA_OF_SIZE * size).powi(2)).sqrt();
         let classes = classes.shares().map(|(class, share)| (class.to_owned(), share)).collect();
         Self { id, centre: quadric.centroid(), sigma, classes }
     }
 
-    fn share(&self, class: &str) -> f64 {
+    fn class_share(&self, class: &str) -> f64 {
         self.classes.get(class).copied().unwrap_or_default()
     }
 }
@@ -121,16 +121,24 @@ impl Mark {
 impl Layout {
     /// Creates the layout of local marks in a prior map. `up` is the up direction of the local marks.
     /// With `by_name`, equal ids are the same object.
-    pub(crate) fn new(local: Vec<Mark>, up: Option<Direction>, map: &PriorMap, by_name: bool) -> Self {
+    pub(crate) fn new(
+        local: Vec<LayoutObject>,
+        up: Option<Direction>,
+        map: &PriorMap,
+        by_name: bool,
+    ) -> Self {
         let mark = |object: &Arc<PriorObject>| {
             let variance = object.covariance().fixed_view::<3, 3>(3, 3).trace() / 3.0;
-            Mark::new(object.id, &object.quadric, variance, &object.classes)
+            LayoutObject::new(object.id, &object.quadric, variance, &object.classes)
         };
-        let known: Vec<Mark> = map.objects.iter().map(mark).collect();
+        let known: Vec<LayoutObject> = map.objects.iter().map(mark).collect();
         let sides = |axis: usize| {
-            let along = known
-                .iter()
-                .map(|mark| (mark.centre[axis] - GATE * mark.sigma, mark.centre[axis] + GATE * mark.sigma));
+            let along = known.iter().map(|mark| {
+                (
+                    mark.centre[axis] - MAX_MATCH_SIGMA * mark.sigma,
+                    mark.centre[axis] + MAX_MATCH_SIGMA * mark.sigma,
+                )
+            });
             along.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))).map_or(1.0, |(from, to)| to - from)
         };
         let log_volume = (0..3).map(|axis| sides(axis).ln()).sum();
@@ -141,14 +149,14 @@ impl Layout {
         layout
     }
 
-    fn pairs(&self, by_name: bool) -> Vec<Pair> {
+    fn pairs(&self, by_name: bool) -> Vec<CandidateMatch> {
         let mut usual: HashMap<&str, f64> = HashMap::new();
         for mark in &self.known {
             for (class, share) in &mark.classes {
                 *usual.entry(class).or_default() += share / self.known.len() as f64;
             }
         }
-        let (doubt, one_of_all) = (CLASS_ERROR / CLASSES, (self.known.len() as f64).ln());
+        let (doubt, one_of_all) = (CLASS_ERROR / CLASS_COUNT, (self.known.len() as f64).ln());
         let mut pairs = vec![];
         for (l, local) in self.local.iter().enumerate() {
             let mut classes: Vec<_> = local.classes.iter().collect();
@@ -160,19 +168,24 @@ impl Layout {
                 (1.0 - CLASS_ERROR) * over(&|class| usual.get(class).copied().unwrap_or_default()) + doubt;
             for (k, known) in self.known.iter().enumerate() {
                 let alike: f64 =
-                    classes.iter().map(|(class, share)| (*share * known.share(class)).sqrt()).sum();
+                    classes.iter().map(|(class, share)| (*share * known.class_share(class)).sqrt()).sum();
                 // a mark without a class may match any class
                 let is_nameless = local.classes.is_empty() || known.classes.is_empty();
                 let evidence = match by_name {
                     true if local.id == known.id => 0.0,
                     false if is_nameless => -one_of_all,
-                    false if alike >= ALIKE => {
-                        let by_class = (1.0 - CLASS_ERROR) * over(&|class| known.share(class)) + doubt;
+                    false if alike >= MIN_CLASS_SIMILARITY => {
+                        let by_class = (1.0 - CLASS_ERROR) * over(&|class| known.class_share(class)) + doubt;
                         (by_class / by_chance).ln() - one_of_all
                     }
                     _ => continue,
                 };
-                pairs.push(Pair { local: l, known: k, evidence, sigma: local.sigma.hypot(known.sigma) });
+                pairs.push(CandidateMatch {
+                    local: l,
+                    known: k,
+                    evidence,
+                    sigma: local.sigma.hypot(known.sigma),
+                });
             }
         }
         pairs.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
@@ -180,7 +193,7 @@ impl Layout {
     }
 
     /// Returns the local marks that may match this known one.
-    pub(super) fn may_be(&self, known: ObjectId) -> impl Iterator<Item = ObjectId> {
+    pub(super) fn possible_matches(&self, known: ObjectId) -> impl Iterator<Item = ObjectId> {
         let pairs = self.pairs.iter().filter(move |pair| self.known[pair.known].id == known);
         pairs.map(|pair| self.local[pair.local].id)
     }
@@ -189,11 +202,11 @@ impl Layout {
     /// a pose. A pose without agreement is rejected, whatever its score.
     pub(super) fn align(
         &self,
-        agreement: impl Fn(&Aligned) -> Option<Agreement>,
-    ) -> Option<(Aligned, Agreement)> {
-        let mut ranked = self.ranked();
+        agreement: impl Fn(&AlignedLayout) -> Option<Agreement>,
+    ) -> Option<(AlignedLayout, Agreement)> {
+        let mut ranked = self.ranked_poses();
         // the agreement is expensive to compute, and no lead exceeds the score
-        if ranked.first().is_none_or(|(score, ..)| *score < LEAD) {
+        if ranked.first().is_none_or(|(score, ..)| *score < MIN_LEAD_NATS) {
             return None;
         }
         ranked.retain(|(score, ..)| *score > 0.0);
@@ -205,20 +218,21 @@ impl Layout {
         let (mut best, agreement) = possible.next()?;
         best.lead -= possible.next().map_or(0.0, |(next, _)| next.lead);
         let place = &best.known_from_local;
-        let among = self.local.iter().filter(|mark| self.is_among(&place.act(&mark.centre))).count();
-        let Aligned { lead, matches, .. } = &best;
+        let among = self.local.iter().filter(|mark| self.is_among_known(&place.act(&mark.centre))).count();
+        let AlignedLayout { lead, matches, .. } = &best;
         tracing::debug!(lead, matches = matches.len(), among, ?agreement, "a place in the prior map");
-        let is_clear =
-            matches.len() >= MATCHES && matches.len() as f64 >= MOST * among as f64 && *lead >= LEAD;
-        (is_clear && agreement.is_believed()).then_some((best, agreement))
+        let is_clear = matches.len() >= MIN_MATCHES
+            && matches.len() as f64 >= MIN_MATCHED_SHARE * among as f64
+            && *lead >= MIN_LEAD_NATS;
+        (is_clear && agreement.is_accepted()).then_some((best, agreement))
     }
 
     /// Returns candidate poses with scores and matches, the best first.
-    fn ranked(&self) -> Vec<(f64, Se3, Vec<Pair>)> {
-        let mut places: Vec<(f64, Se3, Vec<Pair>)> = vec![];
-        for place in self.promising() {
-            let Some((score, place, matches)) = self.refined(place) else { continue };
-            match places.iter_mut().find(|(_, other, _)| self.is_same(other, &place)) {
+    fn ranked_poses(&self) -> Vec<(f64, Se3, Vec<CandidateMatch>)> {
+        let mut places: Vec<(f64, Se3, Vec<CandidateMatch>)> = vec![];
+        for place in self.promising_poses() {
+            let Some((score, place, matches)) = self.refine_pose(place) else { continue };
+            match places.iter_mut().find(|(_, other, _)| self.is_same_pose(other, &place)) {
                 Some(other) if score > other.0 => *other = (score, place, matches),
                 Some(_) => {}
                 None => places.push((score, place, matches)),
@@ -230,16 +244,16 @@ impl Layout {
 
     /// Returns the poses with the highest score bounds. Many hypotheses describe one pose; each pose is
     /// listed once, so that the second best pose is included.
-    fn promising(&self) -> Vec<Se3> {
+    fn promising_poses(&self) -> Vec<Se3> {
         let hypotheses = self.hypotheses().into_iter();
-        let mut rough: Vec<(f64, Se3)> = hypotheses.map(|place| (self.at_most(&place), place)).collect();
+        let mut rough: Vec<(f64, Se3)> = hypotheses.map(|place| (self.score_bound(&place), place)).collect();
         rough.sort_by(|(a, _), (b, _)| b.total_cmp(a));
         let mut places: Vec<Se3> = vec![];
         for (_, place) in rough {
-            if places.len() == LOOKED_AT {
+            if places.len() == MAX_REFINED_HYPOTHESES {
                 break;
             }
-            if !places.iter().any(|other| self.is_same(other, &place)) {
+            if !places.iter().any(|other| self.is_same_pose(other, &place)) {
                 places.push(place);
             }
         }
@@ -247,43 +261,44 @@ impl Layout {
     }
 
     /// Returns whether two pairs are compatible: the marks have equal distances in both sets.
-    fn go_together(&self, a: &Pair, b: &Pair) -> bool {
+    fn are_compatible(&self, a: &CandidateMatch, b: &CandidateMatch) -> bool {
         if a.local == b.local || a.known == b.known {
             return false;
         }
         let local = self.local[b.local].centre - self.local[a.local].centre;
         let known = self.known[b.known].centre - self.known[a.known].centre;
         let (sigma, apart) = (a.sigma.hypot(b.sigma), local.norm());
-        let is_as_high = self.up.is_none_or(|[u, v]| (local.dot(&u) - known.dot(&v)).abs() < GATE * sigma);
+        let is_as_high =
+            self.up.is_none_or(|[u, v]| (local.dot(&u) - known.dot(&v)).abs() < MAX_MATCH_SIGMA * sigma);
         // marks that are too close do not determine a direction
-        apart > sigma && (apart - known.norm()).abs() < GATE * sigma && is_as_high
+        apart > sigma && (apart - known.norm()).abs() < MAX_MATCH_SIGMA * sigma && is_as_high
     }
 
     /// Returns the least squares pose of some pairs (Umeyama); `None` if it is not determined.
-    fn place(&self, pairs: &[Pair]) -> Option<Se3> {
+    fn fit_pose(&self, pairs: &[CandidateMatch]) -> Option<Se3> {
         if pairs.len() < 2 {
             return None;
         }
-        let centres = |pair: &Pair| (self.local[pair.local].centre, self.known[pair.known].centre);
-        let weighted = |pair: &Pair| (centres(pair).0, centres(pair).1, pair.sigma.powi(-2));
+        let centres = |pair: &CandidateMatch| (self.local[pair.local].centre, self.known[pair.known].centre);
+        let weighted = |pair: &CandidateMatch| (centres(pair).0, centres(pair).1, pair.sigma.powi(-2));
         let mut points = PointPairs::new(pairs.iter().map(weighted));
         if let Some([u, v]) = self.up {
             // the up direction is more accurate than any mark
-            points.add_direction(&u, &v, UP);
+            points.add_direction(&u, &v, UP_WEIGHT);
         }
-        points.rigid(FLAT).map(|found| Se3::new(found.rotation, found.translation))
+        points.rigid(MIN_RELATIVE_SPREAD).map(|found| Se3::new(found.rotation, found.translation))
     }
 
     /// Returns the log-likelihood ratio of a pair at a pose, in nats; `None` if the marks are too far apart.
-    fn gain(&self, place: &Se3, pair: &Pair) -> Option<f64> {
+    fn gain(&self, place: &Se3, pair: &CandidateMatch) -> Option<f64> {
         let apart = place.act(&self.local[pair.local].centre) - self.known[pair.known].centre;
         let square = apart.norm_squared() / (pair.sigma * pair.sigma);
         let density = -0.5 * square - 1.5 * (TAU * pair.sigma * pair.sigma).ln();
-        Some(pair.evidence + density + self.log_volume).filter(|_| square < GATE * GATE)
+        Some(pair.evidence + density + self.log_volume).filter(|_| square < MAX_MATCH_SIGMA * MAX_MATCH_SIGMA)
     }
 
     /// Returns an upper bound of the score of a pose: it lets a known mark match several local ones.
-    fn at_most(&self, place: &Se3) -> f64 {
+    fn score_bound(&self, place: &Se3) -> f64 {
         let mut best = vec![0.0_f64; self.local.len()];
         for pair in &self.pairs {
             if let Some(gain) = self.gain(place, pair) {
@@ -294,52 +309,52 @@ impl Layout {
     }
 
     /// Returns the best pose near this one, with its score and matches.
-    fn refined(&self, mut place: Se3) -> Option<(f64, Se3, Vec<Pair>)> {
-        for _ in 0..ROUNDS {
-            place = self.place(&self.matches(&place))?;
+    fn refine_pose(&self, mut place: Se3) -> Option<(f64, Se3, Vec<CandidateMatch>)> {
+        for _ in 0..MATCHING_ROUNDS {
+            place = self.fit_pose(&self.matches(&place))?;
         }
         // the last step may have moved marks apart, so match again
         let matches = self.matches(&place);
         let gained: f64 = matches.iter().filter_map(|pair| self.gain(&place, pair)).sum();
-        let is_matched = |l: usize| matches.iter().any(|pair: &Pair| pair.local == l);
+        let is_matched = |l: usize| matches.iter().any(|pair: &CandidateMatch| pair.local == l);
         let alone = (0..self.local.len())
-            .filter(|l| !is_matched(*l) && self.is_among(&place.act(&self.local[*l].centre)));
-        Some((gained - NEW * alone.count() as f64, place, matches))
+            .filter(|l| !is_matched(*l) && self.is_among_known(&place.act(&self.local[*l].centre)));
+        Some((gained - UNMATCHED_COST * alone.count() as f64, place, matches))
     }
 
-    fn matches(&self, place: &Se3) -> Vec<Pair> {
+    fn matches(&self, place: &Se3) -> Vec<CandidateMatch> {
         let gains: Vec<(usize, usize, f64)> = self
             .pairs
             .iter()
             .filter_map(|pair| Some((pair.local, pair.known, self.gain(place, pair)?)))
             .collect();
         let matched = best_assignment(self.local.len(), self.known.len(), &gains);
-        let is_match = |pair: &&Pair| matched[pair.local] == Some(pair.known);
+        let is_match = |pair: &&CandidateMatch| matched[pair.local] == Some(pair.known);
         self.pairs.iter().filter(is_match).copied().collect()
     }
 
     /// Returns whether two poses place all marks at about the same points.
-    fn is_same(&self, one: &Se3, two: &Se3) -> bool {
-        self.local
-            .iter()
-            .all(|mark| (one.act(&mark.centre) - two.act(&mark.centre)).norm() < SAME * 2.0 * mark.sigma)
+    fn is_same_pose(&self, one: &Se3, two: &Se3) -> bool {
+        self.local.iter().all(|mark| {
+            (one.act(&mark.centre) - two.act(&mark.centre)).norm() < SAME_POSE_SIGMA * 2.0 * mark.sigma
+        })
     }
 
     /// Returns whether a point lies among the known marks.
-    fn is_among(&self, point: &Vector3<f64>) -> bool {
+    fn is_among_known(&self, point: &Vector3<f64>) -> bool {
         let nearest =
             self.known.iter().map(|mark| (mark.centre - point).norm()).fold(f64::INFINITY, f64::min);
         nearest < self.gap
     }
 
-    fn aligned(&self, place: Se3, matches: &[Pair], lead: f64) -> Aligned {
+    fn aligned(&self, place: Se3, matches: &[CandidateMatch], lead: f64) -> AlignedLayout {
         let n = matches.len() as f64;
         let centre = matches.iter().map(|pair| self.local[pair.local].centre).sum::<Vector3<f64>>() / n;
-        let mean = |of: &dyn Fn(&Pair) -> f64| (matches.iter().map(of).sum::<f64>() / n).sqrt();
+        let mean = |of: &dyn Fn(&CandidateMatch) -> f64| (matches.iter().map(of).sum::<f64>() / n).sqrt();
         let sigma = mean(&|pair| pair.sigma * pair.sigma) / n.sqrt();
         let spread = mean(&|pair| (self.local[pair.local].centre - centre).norm_squared());
-        let name = |pair: &Pair| (self.local[pair.local].id, self.known[pair.known].id);
-        Aligned {
+        let name = |pair: &CandidateMatch| (self.local[pair.local].id, self.known[pair.known].id);
+        AlignedLayout {
             known_from_local: place,
             matches: matches.iter().map(name).collect(),
             lead,
@@ -351,8 +366,8 @@ impl Layout {
 }
 
 /// Returns the median distance of a mark to its nearest neighbour.
-fn gap(marks: &[Mark]) -> f64 {
-    let to_next = |mark: &Mark| {
+fn gap(marks: &[LayoutObject]) -> f64 {
+    let to_next = |mark: &LayoutObject| {
         let others = marks.iter().filter(|other| other.id != mark.id);
         others.map(|other| (other.centre - mark.centre).norm()).fold(f64::INFINITY, f64::min)
     };
@@ -361,7 +376,7 @@ fn gap(marks: &[Mark]) -> f64 {
     gaps.get(gaps.len() / 2).copied().unwrap_or_default()
 }
 
-impl Aligned {
+impl AlignedLayout {
     /// Returns the noise of a local pose in the prior map: rad, then m, in its own frame.
     ///
     /// # Errors
@@ -371,7 +386,7 @@ impl Aligned {
         let shift = shift.hypot(turn * (local.translation - self.centre).norm());
         let mut covariance = DMatrix::from_diagonal_element(6, 6, shift * shift);
         let known_from_camera = self.known_from_local.rotation.compose(&local.rotation);
-        let tilt = self.up.map_or(turn, |_| TILT);
+        let tilt = self.up.map_or(turn, |_| TILT_SIGMA_RAD);
         let up = self.up.map_or(Vector3::z(), |up| known_from_camera.inverse().act(&up));
         let turns = Matrix3::identity() * (tilt * tilt) + up * up.transpose() * (turn * turn - tilt * tilt);
         covariance.view_mut((0, 0), (3, 3)).copy_from(&turns);

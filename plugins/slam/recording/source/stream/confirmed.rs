@@ -5,39 +5,39 @@ use std::collections::VecDeque;
 
 /// A frame that is more than this number of seconds ahead of the previous frame waits for the next one. A
 /// longer pause of a robot delays one frame.
-const AHEAD: f64 = 10.0;
+const MAX_JUMP_S: f64 = 10.0;
 /// This limit as a multiple of the last interval between frames, for sources with, for example, one frame per
 /// minute.
-const INTERVALS: f64 = 10.0;
+const MAX_JUMP_INTERVALS: f64 = 10.0;
 
-type Read = Result<Observation, SourceError>;
+type ReadFrame = Result<Observation, SourceError>;
 
 /// Frames in their order. A frame whose timestamp jumps ahead is delayed until a later frame is close behind
 /// it, or until two later frames continue from there. Without this check, a single wrong timestamp would make
 /// all later frames look old. The first frame waits for the second one for the same reason.
-pub struct Confirmed<I> {
+pub struct OrderedFrames<I> {
     frames: I,
     /// Timestamp of the last frame that was returned. Unit: seconds.
     last: Option<f64>,
     /// Interval between the last two returned frames. Unit: seconds.
     interval: f64,
     /// Frames that were read early to confirm a timestamp.
-    ahead: VecDeque<Read>,
+    ahead: VecDeque<ReadFrame>,
 }
 
 /// Returns the timestamp of a readable frame, if it is finite.
-fn timestamp(read: &Read) -> Option<f64> {
+fn timestamp(read: &ReadFrame) -> Option<f64> {
     let timestamp = read.as_ref().ok()?.frame.timestamp;
     timestamp.is_finite().then_some(timestamp)
 }
 
-impl<I: Iterator<Item = Read>> Confirmed<I> {
+impl<I: Iterator<Item = ReadFrame>> OrderedFrames<I> {
     /// Frames as they are read.
     pub fn new(frames: I) -> Self {
         Self { frames, last: None, interval: 0.0, ahead: VecDeque::new() }
     }
 
-    fn give(&mut self, read: Read) -> Option<Read> {
+    fn accept_frame(&mut self, read: ReadFrame) -> Option<ReadFrame> {
         if let Some(timestamp) = timestamp(&read) {
             self.interval = self.last.map_or(0.0, |last| timestamp - last);
             self.last = Some(timestamp);
@@ -47,17 +47,17 @@ impl<I: Iterator<Item = Read>> Confirmed<I> {
 
     /// Returns the first frame unless the next two frames contradict it: they ascend, and both come before
     /// it. A pause after the first frame is no contradiction, because it makes no later frame look old.
-    fn first(&mut self, read: Read, first: f64) -> Option<Read> {
-        if let Some(second) = self.later(0).filter(|second| *second < first)
-            && let Some(third) = self.later(1).filter(|third| *third > second && *third < first)
+    fn check_first(&mut self, read: ReadFrame, first: f64) -> Option<ReadFrame> {
+        if let Some(second) = self.later_timestamp(0).filter(|second| *second < first)
+            && let Some(third) = self.later_timestamp(1).filter(|third| *third > second && *third < first)
         {
             return Some(Err(SourceError::FirstAhead { timestamp: first, next: [second, third] }));
         }
-        self.give(read)
+        self.accept_frame(read)
     }
 
     /// Returns the timestamp of the `n`-th later frame, from 0; `None` at the end.
-    fn later(&mut self, n: usize) -> Option<f64> {
+    fn later_timestamp(&mut self, n: usize) -> Option<f64> {
         loop {
             if let Some(found) = self.ahead.iter().filter_map(timestamp).nth(n) {
                 return Some(found);
@@ -68,26 +68,26 @@ impl<I: Iterator<Item = Read>> Confirmed<I> {
     }
 }
 
-impl<I: Iterator<Item = Read>> Iterator for Confirmed<I> {
-    type Item = Read;
+impl<I: Iterator<Item = ReadFrame>> Iterator for OrderedFrames<I> {
+    type Item = ReadFrame;
 
-    fn next(&mut self) -> Option<Read> {
+    fn next(&mut self) -> Option<ReadFrame> {
         let read = self.ahead.pop_front().or_else(|| self.frames.next())?;
-        let Some(here) = timestamp(&read) else { return self.give(read) };
-        let Some(last) = self.last else { return self.first(read, here) };
-        let limit = AHEAD.max(INTERVALS * self.interval);
+        let Some(here) = timestamp(&read) else { return self.accept_frame(read) };
+        let Some(last) = self.last else { return self.check_first(read, here) };
+        let limit = MAX_JUMP_S.max(MAX_JUMP_INTERVALS * self.interval);
         if here - last <= limit {
-            return self.give(read);
+            return self.accept_frame(read);
         }
-        let is_confirmed = match self.later(0) {
+        let is_confirmed = match self.later_timestamp(0) {
             // the last frame makes no later frame look old
             None => true,
             Some(next) if next <= here => false,
             Some(next) if next - here <= limit => true,
-            Some(next) => self.later(1).is_none_or(|third| third > next),
+            Some(next) => self.later_timestamp(1).is_none_or(|third| third > next),
         };
         match is_confirmed {
-            true => self.give(read),
+            true => self.accept_frame(read),
             false => Some(Err(SourceError::Ahead { timestamp: here, ahead: here - last })),
         }
     }
@@ -99,13 +99,13 @@ mod tests {
     use crate::sequence::Frame;
     use manifactor_geometry::Se3;
 
-    fn observation(timestamp: f64) -> Read {
+    fn observation(timestamp: f64) -> ReadFrame {
         let frame = Frame { timestamp, world_from_camera: Se3::identity() };
         Ok(Observation { frame, detections: vec![], accelerometer: vec![], unused: vec![] })
     }
 
     fn confirmed(stamps: &[f64]) -> Vec<Option<f64>> {
-        let read = Confirmed::new(stamps.iter().copied().map(observation));
+        let read = OrderedFrames::new(stamps.iter().copied().map(observation));
         read.map(|read| read.ok().map(|observation| observation.frame.timestamp)).collect()
     }
 
@@ -151,7 +151,7 @@ mod tests {
     fn a_first_frame_waits_for_the_second_one_alone() {
         let read = std::cell::Cell::new(0);
         let frames = [0.0, 0.1, 0.2].map(observation).into_iter().inspect(|_| read.set(read.get() + 1));
-        assert!(Confirmed::new(frames).next().is_some_and(|first| first.is_ok()));
+        assert!(OrderedFrames::new(frames).next().is_some_and(|first| first.is_ok()));
         assert_eq!(read.get(), 2);
     }
 

@@ -27,7 +27,7 @@ fn the_same_command_may_write_again() {
     drop(claim(&out, "run", false).unwrap());
     fs::write(out.join("report.json"), "{}").unwrap();
     drop(claim(&out, "run", false).unwrap());
-    assert_eq!(fs::read_to_string(out.join(MARKER)).unwrap(), "manifactor run \"/robot/desk.toml\"\n");
+    assert_eq!(fs::read_to_string(out.join(MARKER_FILE)).unwrap(), "manifactor run \"/robot/desk.toml\"\n");
 }
 
 #[test]
@@ -60,15 +60,15 @@ fn a_folder_of_other_files_is_refused_and_unchanged() {
 
 #[test]
 fn a_file_that_is_called_like_a_marker_is_none() {
-    let folder = with(MARKER, "notes");
+    let folder = with(MARKER_FILE, "notes");
     let refused = claim(folder.path(), "run", false).unwrap_err();
     assert!(refused.to_string().ends_with("such as .manifactor"), "{refused}");
-    assert_eq!(fs::read_to_string(folder.path().join(MARKER)).unwrap(), "notes");
+    assert_eq!(fs::read_to_string(folder.path().join(MARKER_FILE)).unwrap(), "notes");
     // the marker of a process that was killed before it wrote anything
     for text in ["", "manifactor simulate \"a.toml\"\nprocess 12\n"] {
-        let folder = with(MARKER, text);
+        let folder = with(MARKER_FILE, text);
         assert!(claim(folder.path(), "run", false).is_ok());
-        let folder = with(MARKER, text);
+        let folder = with(MARKER_FILE, text);
         fs::write(folder.path().join("precious"), "").unwrap();
         assert!(claim(folder.path(), "run", false).is_err());
     }
@@ -114,7 +114,7 @@ fn leftovers_of_a_killed_run_are_removed_and_other_files_are_not() {
     drop(claim(folder.path(), "experiment", true).unwrap());
     assert!(inner.join(left).exists() && folder.path().join(left).exists());
     drop(claim(folder.path(), "experiment", false).unwrap());
-    assert_eq!(names(folder.path()), [MARKER, "repeat", "thesis.unfinished"]);
+    assert_eq!(names(folder.path()), [MARKER_FILE, "repeat", "thesis.unfinished"]);
     assert_eq!(names(&inner), ["thesis.unfinished"]);
 }
 
@@ -126,7 +126,7 @@ fn a_marker_that_is_a_link_is_refused() {
     fs::write(&precious, "manifactor run\nprecious").unwrap();
     let out = folder.path().join("out");
     fs::create_dir(&out).unwrap();
-    std::os::unix::fs::symlink(&precious, out.join(MARKER)).unwrap();
+    std::os::unix::fs::symlink(&precious, out.join(MARKER_FILE)).unwrap();
     for force in [false, true] {
         let refused = claim(&out, "run", force).unwrap_err();
         assert!(refused.to_string().contains("it is a link"), "{refused}");

@@ -5,12 +5,12 @@ use manifactor_mapping::estimate::Estimate;
 use manifactor_metrics::{Alignment, Similarity, align, associate};
 
 /// Transformations from the map frame to the frame of the record.
-pub(super) struct Frames {
+pub(super) struct RecordFrames {
     pub(super) odometry: Similarity,
     pub(super) estimate: Similarity,
 }
 
-impl Frames {
+impl RecordFrames {
     /// Returns the transformations. Simulated trajectories are not aligned, because the errors of their
     /// objects are measured without alignment. Odometry and estimate of recorded data are aligned separately
     /// to the ground truth with SE(3), using poses within `max_time_difference` seconds. Without ground truth

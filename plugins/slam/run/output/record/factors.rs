@@ -2,7 +2,7 @@
 use manifactor_graph::Key;
 use manifactor_graph::batch::FactorState;
 use manifactor_mapping::estimate::Estimate;
-use manifactor_mapping::semantics::Applied;
+use manifactor_mapping::semantics::AppliedRule;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -90,7 +90,7 @@ impl<'a> FactorStates<'a> {
     }
 
     /// Returns a factor of an object, with its residual.
-    pub(super) fn applied(&self, applied: &Applied, object: &Key) -> AppliedFactor {
+    pub(super) fn applied(&self, applied: &AppliedRule, object: &Key) -> AppliedFactor {
         let factors = self.by_key.get(object).into_iter().flatten();
         let mut same = factors.filter(|(name, keys, state)| {
             *name == applied.factor && *keys == applied.keys.as_slice() && state.defined

@@ -1,5 +1,5 @@
 //! Poses and boxes of each frame.
-use super::drawn::Frames;
+use super::drawn::RecordFrames;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_mapping::estimate::Estimate;
@@ -20,16 +20,16 @@ pub struct FrameRecord {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<Se3>,
     /// Pose from odometry alone.
-    pub odometry: TrackedPose,
+    pub odometry: PoseRecord,
     /// Pose from the solver.
-    pub estimate: TrackedPose,
+    pub estimate: PoseRecord,
     /// Boxes in the frame, with their objects.
-    pub boxes: Vec<SeenBox>,
+    pub boxes: Vec<BoxRecord>,
 }
 
 /// A pose and its errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TrackedPose {
+pub struct PoseRecord {
     /// The pose.
     pub pose: Se3,
     /// Absolute position error under the run's alignment. Unit: metres.
@@ -42,7 +42,7 @@ pub struct TrackedPose {
 
 /// A box of an object in one frame. Boxes are xmin, ymin, xmax, ymax in pixels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SeenBox {
+pub struct BoxRecord {
     /// Number of the object.
     pub object: ObjectId,
     /// Box of the detector.
@@ -55,7 +55,7 @@ pub struct SeenBox {
     pub ellipse: Option<[f64; 5]>,
 }
 
-impl SeenBox {
+impl BoxRecord {
     /// Creates a box of an object, with the projection of the `estimate`: camera pose and object.
     pub fn new(
         object: ObjectId,
@@ -63,7 +63,7 @@ impl SeenBox {
         estimate: Option<(&Se3, &DualQuadric)>,
         camera: &Camera,
     ) -> Self {
-        let ellipsoid = estimate.map(|(pose, quadric)| Ellipsoid::seen(pose, quadric));
+        let ellipsoid = estimate.map(|(pose, quadric)| Ellipsoid::in_camera_frame(pose, quadric));
         let ellipse = ellipsoid.filter(Ellipsoid::is_in_front).map(|e| e.outline(camera));
         Self {
             object,
@@ -76,7 +76,7 @@ impl SeenBox {
 
 /// Errors of one trajectory, by timestamp.
 #[derive(Default)]
-struct Errors {
+struct PoseErrors {
     absolute: Vec<(f64, f64)>,
     relative: Vec<(f64, [f64; 2])>,
     truth: Vec<(f64, Se3)>,
@@ -86,18 +86,18 @@ struct Errors {
 pub(super) fn frames(
     estimate: &Estimate,
     settings: &EvaluationSettings,
-    drawn: &Frames,
+    drawn: &RecordFrames,
 ) -> (Vec<FrameRecord>, Option<Alignment>) {
     let alignment = settings.alignments.first().copied().unwrap_or_default();
     let (before, after) = (estimate.odometry(), estimate.trajectory());
     let [odometry, estimated] =
-        [&before, &after].map(|poses| Errors::of(estimate, poses, alignment, settings));
+        [&before, &after].map(|poses| PoseErrors::of(estimate, poses, alignment, settings));
     let any = odometry.is_some();
     let (odometry, estimated) = (odometry.unwrap_or_default(), estimated.unwrap_or_default());
     let mut boxes = boxes(estimate);
     let frames = before.iter().zip(&after).enumerate().map(|(i, (before, after))| FrameRecord {
         timestamp: after.timestamp,
-        truth: at(&odometry.truth, after.timestamp),
+        truth: entry_at(&odometry.truth, after.timestamp),
         odometry: odometry.tracked(before, &drawn.odometry),
         estimate: estimated.tracked(after, &drawn.estimate),
         boxes: boxes.remove(&i).unwrap_or_default(),
@@ -105,7 +105,7 @@ pub(super) fn frames(
     (frames.collect(), any.then_some(alignment))
 }
 
-impl Errors {
+impl PoseErrors {
     /// Returns the errors; `None` if there is no ground truth to compare with.
     fn of(
         estimate: &Estimate,
@@ -127,32 +127,32 @@ impl Errors {
         })
     }
 
-    fn tracked(&self, stamped: &StampedPose, drawn: &Similarity) -> TrackedPose {
-        TrackedPose {
+    fn tracked(&self, stamped: &StampedPose, drawn: &Similarity) -> PoseRecord {
+        PoseRecord {
             pose: drawn.act_on_pose(&stamped.pose),
-            error: at(&self.absolute, stamped.timestamp),
-            relative: at(&self.relative, stamped.timestamp),
+            error: entry_at(&self.absolute, stamped.timestamp),
+            relative: entry_at(&self.relative, stamped.timestamp),
         }
     }
 }
 
 /// Returns the entry of a sorted list at a timestamp.
-fn at<T: Copy>(list: &[(f64, T)], timestamp: f64) -> Option<T> {
+fn entry_at<T: Copy>(list: &[(f64, T)], timestamp: f64) -> Option<T> {
     let place = list.binary_search_by(|(own, _)| own.total_cmp(&timestamp)).ok()?;
     list.get(place).map(|(_, value)| *value)
 }
 
 /// Returns the boxes, by frame.
-fn boxes(estimate: &Estimate) -> BTreeMap<usize, Vec<SeenBox>> {
+fn boxes(estimate: &Estimate) -> BTreeMap<usize, Vec<BoxRecord>> {
     let landmarks = estimate.landmarks();
     let quadrics: BTreeMap<ObjectId, &DualQuadric> =
         landmarks.iter().map(|landmark| (landmark.object.id, landmark.quadric)).collect();
-    let mut boxes: BTreeMap<usize, Vec<SeenBox>> = BTreeMap::new();
+    let mut boxes: BTreeMap<usize, Vec<BoxRecord>> = BTreeMap::new();
     for object in &estimate.mapping.measurements.objects {
         for view in &object.views {
             let camera: Option<&Se3> = estimate.solution.values.get(pose_key(view.frame)).ok();
             let seen = camera.zip(quadrics.get(&object.id).copied());
-            let seen = SeenBox::new(object.id, view.bounding_box, seen, &estimate.sequence.camera);
+            let seen = BoxRecord::new(object.id, view.bounding_box, seen, &estimate.sequence.camera);
             boxes.entry(view.frame).or_default().push(seen);
         }
     }

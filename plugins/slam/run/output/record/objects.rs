@@ -1,5 +1,5 @@
 //! Detections, estimate and ground truth of each object.
-use super::drawn::Frames;
+use super::drawn::RecordFrames;
 use super::factors::{AppliedFactor, FactorStates};
 use crate::output::report::object_errors;
 use manifactor_geometry::Se3;
@@ -35,7 +35,7 @@ pub struct ObjectRecord {
     pub estimate: Option<DualQuadric>,
     /// True shape, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub truth: Option<Solid>,
+    pub truth: Option<TrueCuboid>,
     /// Error of the estimate, if the true shape is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<LandmarkError>,
@@ -50,14 +50,14 @@ pub struct ObjectRecord {
 
 /// Cuboid that encloses a true object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Solid {
+pub struct TrueCuboid {
     /// Centre and axes.
     pub pose: Se3,
     /// Half extents along the axes. Unit: metres.
     pub half_extents: [f64; 3],
 }
 
-pub(super) fn objects(estimate: &Estimate, drawn: &Frames) -> Vec<ObjectRecord> {
+pub(super) fn objects(estimate: &Estimate, drawn: &RecordFrames) -> Vec<ObjectRecord> {
     let truths = estimate.sequence.ground_truth.as_ref().map_or(&[][..], |truth| &truth.objects);
     let (errors, states) = (object_errors(estimate), FactorStates::of(estimate));
     let detected = estimate.mapping.objects.iter().map(|object| {
@@ -73,7 +73,7 @@ pub(super) fn objects(estimate: &Estimate, drawn: &Frames) -> Vec<ObjectRecord> 
             box_rms: states.box_rms(&object.key),
             initial: quadric(&estimate.mapping.values),
             estimate: quadric(&estimate.solution.values),
-            truth: truths.iter().find(|truth| truth.id == object.id).map(Solid::of),
+            truth: truths.iter().find(|truth| truth.id == object.id).map(TrueCuboid::of),
             error: errors.iter().find(|(id, _)| *id == object.id).map(|(_, error)| *error),
             factors: object.semantic_factors.iter().map(|a| states.applied(a, &object.key)).collect(),
             left_out: object.left_out.iter().map(|l| format!("{}: {}", l.factor, l.because)).collect(),
@@ -99,7 +99,7 @@ fn never_detected(truth: &TrueObject) -> ObjectRecord {
         box_rms: None,
         initial: None,
         estimate: None,
-        truth: Some(Solid::of(truth)),
+        truth: Some(TrueCuboid::of(truth)),
         error: None,
         factors: vec![],
         left_out: vec![],
@@ -111,7 +111,7 @@ fn moved(quadric: &DualQuadric, frame: &Similarity) -> DualQuadric {
     DualQuadric { pose: frame.act_on_pose(&quadric.pose), semi_axes: quadric.semi_axes * frame.scale }
 }
 
-impl Solid {
+impl TrueCuboid {
     fn of(truth: &TrueObject) -> Self {
         Self { pose: truth.world_from_object, half_extents: truth.half_extents.into() }
     }

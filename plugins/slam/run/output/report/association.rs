@@ -1,5 +1,5 @@
 //! Report of data association.
-use manifactor_association::{Association, Names};
+use manifactor_association::{Association, ObjectIdChanges};
 use manifactor_metrics::{IdentityScores, identity};
 use manifactor_online::FrameReport;
 use manifactor_recording::sequence::{Detection, ObjectId};
@@ -26,14 +26,14 @@ pub struct AssociationReport {
 
 /// Objects of all boxes in order of time: from the source, and from data association.
 #[derive(Debug, Default)]
-pub(crate) struct Naming {
-    boxes: Vec<Named>,
+pub(crate) struct AssociationHistory {
+    boxes: Vec<BoxAssociation>,
     /// Dropped object candidates, whose boxes have no object.
     forgotten: BTreeSet<ObjectId>,
 }
 
 #[derive(Debug)]
-struct Named {
+struct BoxAssociation {
     /// Object of the source.
     truth: Option<ObjectId>,
     /// Object when the box arrived.
@@ -44,20 +44,20 @@ struct Named {
     again: Option<Option<ObjectId>>,
 }
 
-impl Named {
+impl BoxAssociation {
     /// Returns the object at the end.
-    fn now(&self, names: &Names) -> Option<ObjectId> {
+    fn current_object(&self, names: &ObjectIdChanges) -> Option<ObjectId> {
         let (frame, place) = self.place;
-        self.again.unwrap_or_else(|| self.then.map(|name| names.of(name, frame, place)))
+        self.again.unwrap_or_else(|| self.then.map(|name| names.object_of_detection(name, frame, place)))
     }
 }
 
-impl Naming {
+impl AssociationHistory {
     /// Records a frame's boxes and their objects; the boxes of a skipped frame have no object.
-    pub(crate) fn note(&mut self, detections: &[Detection], taken: Option<&FrameReport>) {
-        let given = |place: usize| taken.and_then(|report| report.names.get(place).copied().flatten());
+    pub(crate) fn record_frame(&mut self, detections: &[Detection], taken: Option<&FrameReport>) {
+        let given = |place: usize| taken.and_then(|report| report.box_objects.get(place).copied().flatten());
         let frame = taken.map_or(0, |report| report.frame);
-        let named = |(place, detection): (usize, &Detection)| Named {
+        let named = |(place, detection): (usize, &Detection)| BoxAssociation {
             truth: detection.object,
             then: given(place),
             place: (frame, place),
@@ -69,37 +69,42 @@ impl Naming {
     }
 
     /// Assigns new objects to some boxes, computed from their current objects.
-    pub(crate) fn replace(
+    pub(crate) fn replace_objects(
         &mut self,
         boxes: Range<usize>,
-        names: &Names,
+        names: &ObjectIdChanges,
         by: impl FnOnce(&[Option<ObjectId>]) -> Vec<Option<ObjectId>>,
     ) {
         let boxes = self.boxes.get_mut(boxes).unwrap_or_default();
-        let now: Vec<_> = boxes.iter().map(|named| named.now(names)).collect();
+        let now: Vec<_> = boxes.iter().map(|named| named.current_object(names)).collect();
         for (named, name) in boxes.iter_mut().zip(by(&now)) {
             named.again = Some(name);
         }
     }
 
     /// Returns the current objects of all boxes.
-    pub(crate) fn now<'a>(&'a self, names: &'a Names) -> impl Iterator<Item = Option<ObjectId>> + 'a {
-        self.boxes.iter().map(|named| named.now(names).filter(|name| !self.forgotten.contains(name)))
+    pub(crate) fn current_objects<'a>(
+        &'a self,
+        names: &'a ObjectIdChanges,
+    ) -> impl Iterator<Item = Option<ObjectId>> + 'a {
+        self.boxes
+            .iter()
+            .map(|named| named.current_object(names).filter(|name| !self.forgotten.contains(name)))
     }
 
     /// Returns the report; `None` if the objects of the source are used.
-    pub(crate) fn report(&self, by: &dyn Association, names: &Names) -> Option<AssociationReport> {
+    pub(crate) fn report(&self, by: &dyn Association, names: &ObjectIdChanges) -> Option<AssociationReport> {
         let is_known = self.boxes.iter().any(|named| named.truth.is_some());
         let score = |put: &mut dyn Iterator<Item = Option<ObjectId>>| {
             let truth = self.boxes.iter().map(|named| named.truth);
             is_known.then(|| identity(truth.zip(put).filter_map(|(truth, put)| Some((truth?, put)))))
         };
-        (!by.uses_names()).then(|| AssociationReport {
+        (!by.uses_source_ids()).then(|| AssociationReport {
             by: by.typetag_name(),
-            merged: names.given_up(),
-            moved: names.moved(),
+            merged: names.given_up_ids(),
+            moved: names.moved_detections(),
             at_the_time: score(&mut self.boxes.iter().map(|named| named.then)),
-            in_the_end: score(&mut self.now(names)),
+            in_the_end: score(&mut self.current_objects(names)),
         })
     }
 }

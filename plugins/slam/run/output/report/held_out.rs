@@ -1,9 +1,9 @@
 //! Held-out boxes, compared with the boxes that the estimate predicts.
 use manifactor_geometry::Se3;
 use manifactor_mapping::estimate::Estimate;
-use manifactor_mapping::mapping::measurements::{ObjectBox, Sifted, sift};
+use manifactor_mapping::mapping::measurements::{FilteredDetection, ObjectBox, filter_detection};
 use manifactor_mapping::mapping::{object_key, pose_key};
-use manifactor_mapping::settings::{Holdout, Settings};
+use manifactor_mapping::settings::{Holdout, RunSettings};
 use manifactor_quadric::{BoundingBoxFactor, DualQuadric};
 use manifactor_recording::sequence::{Detection, ObjectId};
 use serde::Serialize;
@@ -33,15 +33,15 @@ pub struct Prediction {
     /// no error in pixels.
     pub out_of_view: usize,
     /// Mean intersection over union, 0 to 1.
-    pub iou: Mean,
+    pub iou: ClusteredMean,
     /// Mean over boxes of the root mean square error of their sides. Unit: pixels.
-    pub pixels: Mean,
+    pub pixels: ClusteredMean,
 }
 
 /// A mean with its standard error. Boxes of one object have similar errors, so objects are the independent
 /// samples. `None` for a single object.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Mean {
+pub struct ClusteredMean {
     /// The mean.
     pub mean: f64,
     /// Standard error of the mean.
@@ -49,23 +49,25 @@ pub struct Mean {
 }
 
 /// Prediction of one box.
-struct Predicted {
+struct PredictedBox {
     object: ObjectId,
     iou: f64,
     pixels: Option<f64>,
 }
 
 impl HeldOutReport {
-    pub(crate) fn new(estimate: &Estimate, held_out: &[Detection], settings: &Settings) -> Option<Self> {
+    pub(crate) fn new(estimate: &Estimate, held_out: &[Detection], settings: &RunSettings) -> Option<Self> {
         let holdout = settings.evaluation.holdout?;
         let (mut unmapped, mut all) = (0, vec![]);
         let mut classes: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for detection in held_out {
-            let Sifted::View(view) = sift(detection, &estimate.sequence.camera, &settings.detections) else {
+            let FilteredDetection::View(view) =
+                filter_detection(detection, &estimate.sequence.camera, &settings.detections)
+            else {
                 continue;
             };
             let Some(object) = detection.object else { continue };
-            match predicted(estimate, object, &view, settings) {
+            match predict_box(estimate, object, &view, settings) {
                 Some(predicted) => {
                     let class = estimate.mapping.measurements.object(object).and_then(|own| own.class_name());
                     classes.entry(class.unwrap_or("unknown").to_owned()).or_default().push(all.len());
@@ -81,12 +83,12 @@ impl HeldOutReport {
 }
 
 /// Predicts a box; `None` if the object is not in the map.
-fn predicted(
+fn predict_box(
     estimate: &Estimate,
     object: ObjectId,
     view: &ObjectBox,
-    settings: &Settings,
-) -> Option<Predicted> {
+    settings: &RunSettings,
+) -> Option<PredictedBox> {
     let values = &estimate.solution.values;
     let quadric = values.get::<DualQuadric>(object_key(object).as_str()).ok()?;
     let pose = values.get::<Se3>(pose_key(view.frame).as_str()).ok()?;
@@ -98,13 +100,13 @@ fn predicted(
         let off = outline.bounds().into_iter().zip(bounding_box.bounds()).map(|(a, b)| (a - b).powi(2));
         (off.sum::<f64>() / 4.0).sqrt()
     });
-    Some(Predicted { object, iou: outline.map_or(0.0, |outline| outline.iou(&bounding_box)), pixels })
+    Some(PredictedBox { object, iou: outline.map_or(0.0, |outline| outline.iou(&bounding_box)), pixels })
 }
 
 impl Prediction {
-    fn of<'a>(boxes: impl Iterator<Item = &'a Predicted>) -> Self {
-        let boxes: Vec<&Predicted> = boxes.collect();
-        let by_object = |of: &dyn Fn(&Predicted) -> Option<f64>| {
+    fn of<'a>(boxes: impl Iterator<Item = &'a PredictedBox>) -> Self {
+        let boxes: Vec<&PredictedBox> = boxes.collect();
+        let by_object = |of: &dyn Fn(&PredictedBox) -> Option<f64>| {
             let mut objects: BTreeMap<ObjectId, Vec<f64>> = BTreeMap::new();
             for predicted in &boxes {
                 objects.entry(predicted.object).or_default().extend(of(predicted));
@@ -116,13 +118,13 @@ impl Prediction {
             boxes: boxes.len(),
             objects: ious.len(),
             out_of_view: boxes.iter().filter(|predicted| predicted.pixels.is_none()).count(),
-            iou: Mean::of(&ious),
-            pixels: Mean::of(&by_object(&|predicted| predicted.pixels)),
+            iou: ClusteredMean::of(&ious),
+            pixels: ClusteredMean::of(&by_object(&|predicted| predicted.pixels)),
         }
     }
 }
 
-impl Mean {
+impl ClusteredMean {
     /// Returns the mean of values that are grouped by object.
     fn of(objects: &[Vec<f64>]) -> Self {
         let n = objects.iter().map(Vec::len).sum::<usize>() as f64;
@@ -139,9 +141,10 @@ mod tests {
 
     #[test]
     fn the_error_of_a_mean_counts_objects_and_not_boxes() {
-        let alone = Mean::of(&[vec![0.5, 0.7]]);
+        let alone = ClusteredMean::of(&[vec![0.5, 0.7]]);
         assert!((alone.mean - 0.6).abs() < 1e-12 && alone.error.is_none());
-        let (few, many) = (Mean::of(&[vec![0.4], vec![0.8]]), Mean::of(&[vec![0.4; 50], vec![0.8; 50]]));
+        let (few, many) =
+            (ClusteredMean::of(&[vec![0.4], vec![0.8]]), ClusteredMean::of(&[vec![0.4; 50], vec![0.8; 50]]));
         assert!((few.mean - many.mean).abs() < 1e-12);
         assert!((few.error.unwrap() - many.error.unwrap()).abs() < 1e-12);
         // the standard error of a mean of two values

@@ -1,4 +1,4 @@
-use manifactor_mapping::estimate::{Estimate, Landmark};
+use manifactor_mapping::estimate::{Estimate, LandmarkEstimate};
 use manifactor_quadric::LandmarkError;
 use serde::Serialize;
 
@@ -26,10 +26,10 @@ pub struct LandmarkSummary {
 /// differ from the map frame.
 pub(super) fn in_truth_frame<'a>(
     estimate: &Estimate,
-    landmarks: Vec<Landmark<'a>>,
-) -> Vec<(Landmark<'a>, LandmarkError)> {
+    landmarks: Vec<LandmarkEstimate<'a>>,
+) -> Vec<(LandmarkEstimate<'a>, LandmarkError)> {
     let truth_from_map = estimate.mapping.frame.map_from_odometry.inverse();
-    let compare = |landmark: Landmark<'a>| {
+    let compare = |landmark: LandmarkEstimate<'a>| {
         let mut quadric = *landmark.quadric;
         quadric.pose = truth_from_map.compose(&quadric.pose);
         let error = LandmarkError::of(&quadric, &landmark.truth?.bounding_box);
@@ -41,8 +41,8 @@ pub(super) fn in_truth_frame<'a>(
 impl LandmarkReport {
     /// Creates the summaries before and after the solve; `None` without known truth.
     pub(super) fn new(
-        before: &[(Landmark<'_>, LandmarkError)],
-        after: &[(Landmark<'_>, LandmarkError)],
+        before: &[(LandmarkEstimate<'_>, LandmarkError)],
+        after: &[(LandmarkEstimate<'_>, LandmarkError)],
     ) -> Option<Self> {
         let (initial, estimate) = (LandmarkSummary::of(before)?, LandmarkSummary::of(after)?);
         Some(Self { objects: after.len(), initial, estimate })
@@ -50,7 +50,7 @@ impl LandmarkReport {
 }
 
 impl LandmarkSummary {
-    fn of(errors: &[(Landmark<'_>, LandmarkError)]) -> Option<Self> {
+    fn of(errors: &[(LandmarkEstimate<'_>, LandmarkError)]) -> Option<Self> {
         let errors: Vec<LandmarkError> = errors.iter().map(|(_, error)| *error).collect();
         Self::over(&errors)
     }

@@ -21,9 +21,11 @@ pub struct OnlineReport {
     /// True if the user ended the stream before its last frame.
     pub interrupted: bool,
     /// Number of objects added to the map.
-    pub born: usize,
+    #[serde(rename = "born")]
+    pub initialized: usize,
     /// Number of objects that were removed again.
-    pub withdrawn: usize,
+    #[serde(rename = "withdrawn")]
+    pub removed: usize,
     /// Number of times that rules were applied again to an object because its class had changed.
     pub revised: usize,
     /// Skipped frames and rejected input; the first of them in words.
@@ -46,57 +48,57 @@ pub struct OnlineReport {
 }
 
 /// Largest number of refusals that are reported in words.
-const TOLD: usize = 20;
+const MAX_REPORTED_REFUSALS: usize = 20;
 
 impl OnlineReport {
     /// Resets the counts of the map when the map is rebuilt from the frames so far. Durations and skipped
     /// frames are kept.
-    pub(crate) fn begin_again(&mut self) {
+    pub(crate) fn reset_map_counts(&mut self) {
         let Self { seconds, left_out, .. } = std::mem::take(self);
         let (refused, refusals) = left_out.clone();
         *self = Self { seconds, left_out, refused, refusals, ..Self::default() };
     }
 
     /// Counts a frame.
-    pub(crate) fn count(&mut self, report: Result<&FrameReport, &FrameError>, seconds: f64) {
+    pub(crate) fn add_frame(&mut self, report: Result<&FrameReport, &FrameError>, seconds: f64) {
         self.seconds.push(seconds);
         match report {
-            Ok(report) => self.tell(report),
+            Ok(report) => self.add_frame_report(report),
             Err(error) => {
                 let (told, all) = &mut self.left_out;
                 *all += 1;
-                told.extend(Some(error.to_string()).filter(|_| told.len() < TOLD));
-                self.refuse(&[error.to_string()]);
+                told.extend(Some(error.to_string()).filter(|_| told.len() < MAX_REPORTED_REFUSALS));
+                self.add_refusals(&[error.to_string()]);
             }
         }
     }
 
     /// Counts the results of a frame.
-    pub(crate) fn tell(&mut self, report: &FrameReport) {
-        self.born += report.born.len();
-        self.withdrawn += report.withdrawn.len();
+    pub(crate) fn add_frame_report(&mut self, report: &FrameReport) {
+        self.initialized += report.initialized.len();
+        self.removed += report.removed.len();
         self.revised += report.revised.len();
         self.solved_batch += report.updates.iter().filter(|update| update.solved_batch).count();
-        self.refuse(&report.refused);
+        self.add_refusals(&report.refused);
     }
 
-    fn refuse(&mut self, refused: &[String]) {
+    fn add_refusals(&mut self, refused: &[String]) {
         self.refusals += refused.len();
-        let room = TOLD.saturating_sub(self.refused.len());
+        let room = MAX_REPORTED_REFUSALS.saturating_sub(self.refused.len());
         self.refused.extend(refused.iter().take(room).cloned());
     }
 
     /// Completes the report after the last frame.
-    pub(crate) fn end(&mut self, mapper: &mut Mapper) {
+    pub(crate) fn add_final_counts(&mut self, mapper: &mut Mapper) {
         self.latencies = Latencies::of(&self.seconds);
-        self.objects = mapper.mapped();
-        self.cost = mapper.session().cost();
-        self.bytes = mapper.session().bytes();
-        self.live = mapper.live().to_vec();
+        self.objects = mapper.mapped_objects();
+        self.cost = mapper.smoother().cost();
+        self.bytes = mapper.smoother().bytes();
+        self.live = mapper.live_poses().to_vec();
     }
 
     /// Compares the live poses with ground truth.
-    pub(crate) fn compare(&mut self, estimate: &Estimate, settings: &EvaluationSettings) {
+    pub(crate) fn compare_live_poses(&mut self, estimate: &Estimate, settings: &EvaluationSettings) {
         let poses = [estimate.odometry(), self.live.clone()];
         // the report of the estimate has the warnings if a comparison is impossible
         self.trajectory =

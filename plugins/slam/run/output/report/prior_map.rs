@@ -1,8 +1,8 @@
 //! Report of a run with a prior map.
 use manifactor_mapping::estimate::Estimate;
-use manifactor_mapping::mapping::measurements::Measured;
-use manifactor_mapping::settings::Settings;
-use manifactor_online::Located;
+use manifactor_mapping::mapping::measurements::ObjectMeasurements;
+use manifactor_mapping::settings::RunSettings;
+use manifactor_online::Relocalization;
 use manifactor_recording::sequence::ObjectId;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ pub struct PriorMapReport {
     pub is_located: bool,
     /// Result of the relocalization, if the start was unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub found: Option<Found>,
+    pub found: Option<FoundStart>,
     /// Number of objects in the map.
     pub objects: usize,
     /// Objects of the map that were detected again.
@@ -29,26 +29,28 @@ pub struct PriorMapReport {
 
 /// A start that relocalization found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Found {
+pub struct FoundStart {
     /// The frame after which it was found, from 0.
     pub frame: usize,
     /// Pose at the start of the run, and the evidence for it.
     #[serde(flatten)]
-    pub located: Located,
+    pub located: Relocalization,
 }
 
 impl PriorMapReport {
     /// Creates the report, with the objects that are `gone`; `None` without a prior map.
     pub(crate) fn new(
         estimate: &Estimate,
-        settings: &Settings,
-        found: Option<Found>,
+        settings: &RunSettings,
+        found: Option<FoundStart>,
         gone: &[ObjectId],
     ) -> Option<Self> {
         let prior = settings.prior_map.as_ref()?;
         let is_located = prior.start.is_some() || found.is_some();
         let all = &estimate.mapping.measurements.objects;
-        let ids = |which: &dyn Fn(&Measured) -> bool| all.iter().filter(|m| which(m)).map(|m| m.id).collect();
+        let ids = |which: &dyn Fn(&ObjectMeasurements) -> bool| {
+            all.iter().filter(|m| which(m)).map(|m| m.id).collect()
+        };
         let mapped: Vec<ObjectId> = estimate.mapping.mapped().map(|object| object.id).collect();
         Some(Self {
             file: prior.file.clone(),

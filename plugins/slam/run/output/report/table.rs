@@ -3,7 +3,7 @@ use serde::Serialize;
 
 /// One variant as one row. Unknown values are left out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
+pub struct VariantRow {
     /// Name of the variant.
     pub variant: String,
     /// Number of objects in the map.
@@ -36,17 +36,17 @@ pub struct Row {
 
 impl RunReport {
     /// Returns a row for each variant.
-    pub fn table(&self) -> Vec<Row> {
+    pub fn table(&self) -> Vec<VariantRow> {
         self.variants.iter().map(VariantReport::row).collect()
     }
 }
 
 impl VariantReport {
     /// Returns this variant as a row.
-    pub fn row(&self) -> Row {
+    pub fn row(&self) -> VariantRow {
         let trajectory = self.trajectory.first();
         let landmarks = self.landmarks.map(|landmarks| landmarks.estimate);
-        Row {
+        VariantRow {
             variant: self.name.clone(),
             objects: self.counts.objects,
             boxes: self.counts.boxes,
@@ -54,7 +54,7 @@ impl VariantReport {
             final_cost: self.solve.final_cost,
             iterations: self.solve.iterations,
             converged: self.solve.termination.is_converged(),
-            alignment: trajectory.map(|t| super::trajectory::name(t.alignment)),
+            alignment: trajectory.map(|t| super::trajectory::alignment_name(t.alignment)),
             odometry_ate: trajectory.map(|t| t.odometry.ate.rmse),
             ate: trajectory.map(|t| t.estimate.ate.rmse),
             position: landmarks.map(|l| l.rmse.position),

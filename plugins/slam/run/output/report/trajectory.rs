@@ -71,8 +71,8 @@ pub(super) fn compare(
             Err(error) => warnings.push(Warning::NotEvaluated { reason: error.to_string() }),
         }
     }
-    warnings.extend(reports.first().and_then(|report| few(report, settings)));
-    warnings.extend(reports.first().and_then(worse));
+    warnings.extend(reports.first().and_then(|report| too_few_poses(report, settings)));
+    warnings.extend(reports.first().and_then(worse_than_odometry));
     reports
 }
 
@@ -97,22 +97,26 @@ fn aligned(
 
 /// Returns a warning if less than half of the poses are compared, because the result hardly applies to the
 /// rest.
-fn few(report: &TrajectoryReport, settings: &EvaluationSettings) -> Option<Warning> {
+fn too_few_poses(report: &TrajectoryReport, settings: &EvaluationSettings) -> Option<Warning> {
     let [covered, poses] = report.covered;
     let truth = report.truth_poses;
     let within = *settings.max_time_difference;
     (2 * covered < poses.min(truth)).then_some(Warning::FewPoses { covered, poses, truth, within })
 }
 
-fn worse(report: &TrajectoryReport) -> Option<Warning> {
+fn worse_than_odometry(report: &TrajectoryReport) -> Option<Warning> {
     let (odometry, estimate) = (report.odometry.ate.rmse, report.estimate.ate.rmse);
     // tolerates rounding: a graph without objects leaves the odometry unchanged
     let grew = estimate > odometry * (1.0 + 1e-6);
-    grew.then(|| Warning::WorseThanOdometry { alignment: name(report.alignment), odometry, estimate })
+    grew.then(|| Warning::WorseThanOdometry {
+        alignment: alignment_name(report.alignment),
+        odometry,
+        estimate,
+    })
 }
 
 /// Returns the name of an alignment in documents.
-pub fn name(alignment: Alignment) -> String {
+pub fn alignment_name(alignment: Alignment) -> String {
     let json = serde_json::to_value(alignment).unwrap_or_default();
     json.as_str().unwrap_or_default().to_owned()
 }

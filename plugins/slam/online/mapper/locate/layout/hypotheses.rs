@@ -1,11 +1,11 @@
 //! Pose hypotheses from a few matching marks.
-use super::{Layout, Pair};
+use super::{CandidateMatch, Layout};
 use manifactor_geometry::Se3;
 
 /// Maximum number of hypotheses.
-const HYPOTHESES: usize = 2000;
+const MAX_HYPOTHESES: usize = 2000;
 /// Maximum number of groups of local marks.
-const GROUPS: usize = 2000;
+const MAX_GROUPS: usize = 2000;
 
 impl Layout {
     /// Returns poses at which two local marks match known ones; three if the up direction is unknown.
@@ -14,22 +14,22 @@ impl Layout {
     pub(super) fn hypotheses(&self) -> Vec<Se3> {
         let (options, size) = (self.options(), if self.up.is_some() { 2 } else { 3 });
         let mut places = vec![];
-        for group in groups(options.len(), size).take(GROUPS) {
-            let mut chosen: Vec<Vec<Pair>> = vec![vec![]];
+        for group in groups(options.len(), size).take(MAX_GROUPS) {
+            let mut chosen: Vec<Vec<CandidateMatch>> = vec![vec![]];
             for member in group {
                 chosen = chosen.iter().flat_map(|some| self.with_one_more(some, &options[member])).collect();
             }
-            places.extend(chosen.iter().filter_map(|pairs| self.place(pairs)));
-            if places.len() >= HYPOTHESES {
+            places.extend(chosen.iter().filter_map(|pairs| self.fit_pose(pairs)));
+            if places.len() >= MAX_HYPOTHESES {
                 break;
             }
         }
-        places.truncate(HYPOTHESES);
+        places.truncate(MAX_HYPOTHESES);
         places
     }
 
     /// Returns the candidate matches of each local mark. Marks with the most distinctive classes come first.
-    fn options(&self) -> Vec<Vec<Pair>> {
+    fn options(&self) -> Vec<Vec<CandidateMatch>> {
         let mut options = vec![vec![]; self.local.len()];
         for pair in &self.pairs {
             options[pair.local].push(*pair);
@@ -43,10 +43,10 @@ impl Layout {
     /// Extends compatible pairs by each further pair that is compatible with all of them.
     fn with_one_more<'a>(
         &'a self,
-        pairs: &'a [Pair],
-        more: &'a [Pair],
-    ) -> impl Iterator<Item = Vec<Pair>> + 'a {
-        let fits = more.iter().filter(|new| pairs.iter().all(|pair| self.go_together(pair, new)));
+        pairs: &'a [CandidateMatch],
+        more: &'a [CandidateMatch],
+    ) -> impl Iterator<Item = Vec<CandidateMatch>> + 'a {
+        let fits = more.iter().filter(|new| pairs.iter().all(|pair| self.are_compatible(pair, new)));
         fits.map(|new| pairs.iter().chain([new]).copied().collect())
     }
 }

@@ -1,7 +1,7 @@
 use super::*;
 use manifactor_geometry::So3;
-use manifactor_recording::class::Aliases;
-use manifactor_recording::prior_map::Looks;
+use manifactor_recording::class::ClassAliases;
+use manifactor_recording::prior_map::LookCounts;
 use manifactor_recording::sequence::ClassScores;
 
 /// An agreement that accepts every pose.
@@ -9,8 +9,8 @@ const AGREES: Agreement = Agreement { overlap: 1.0, seen: 1.0 };
 const CLASSES: [&str; 3] = ["cup", "book", "bottle"];
 
 fn object(id: u32, class: &str, centre: Vector3<f64>) -> Arc<PriorObject> {
-    let mut classes = Fusion::default();
-    classes.add(&ClassScores::single(class, 0.8), &Aliases::default());
+    let mut classes = ClassFusion::default();
+    classes.add(&ClassScores::single(class, 0.8), &ClassAliases::default());
     let quadric = DualQuadric { pose: Se3::new(So3::identity(), centre), semi_axes: Vector3::repeat(0.08) };
     let covariance = std::array::from_fn(|r| std::array::from_fn(|c| if r == c { 1e-4 } else { 0.0 }));
     Arc::new(PriorObject {
@@ -18,7 +18,7 @@ fn object(id: u32, class: &str, centre: Vector3<f64>) -> Arc<PriorObject> {
         classes,
         quadric,
         covariance,
-        looks: Looks::default(),
+        looks: LookCounts::default(),
         least_px: None,
     })
 }
@@ -35,11 +35,15 @@ fn table(classes: &[&str], up: Option<Direction>) -> PriorMap {
 }
 
 /// Returns the objects seen from a different pose, without the first `without` of them.
-fn seen(map: &PriorMap, known_from_local: &Se3, without: usize) -> (Vec<Mark>, Option<Direction>) {
+fn local_objects(
+    map: &PriorMap,
+    known_from_local: &Se3,
+    without: usize,
+) -> (Vec<LayoutObject>, Option<Direction>) {
     let local = known_from_local.inverse();
     let mark = |object: &Arc<PriorObject>| {
         let quadric = DualQuadric { pose: local.compose(&object.quadric.pose), ..object.quadric };
-        Mark::new(ObjectId(object.id.0 - 10), &quadric, 1e-4, &object.classes)
+        LayoutObject::new(ObjectId(object.id.0 - 10), &quadric, 1e-4, &object.classes)
     };
     let up = map.up.map(|up| Direction::new(local.rotation.act(&up)).unwrap());
     (map.objects.iter().skip(without).map(mark).collect(), up)
@@ -58,7 +62,7 @@ fn scattered(n: u32) -> impl Iterator<Item = [f64; 2]> {
     (0..n).map(move |i| [8.0 * part(i * i, 0.618_033_988_7), 8.0 * part(i * i, 0.414_213_562_4)])
 }
 
-fn elsewhere() -> Se3 {
+fn any_other_pose() -> Se3 {
     Se3::new(So3::exp(&Vector3::new(0.4, -0.7, 1.9)), Vector3::new(2.0, -1.0, 0.5))
 }
 
@@ -66,9 +70,9 @@ fn elsewhere() -> Se3 {
 fn a_layout_is_found_again_with_and_without_up() {
     for up in [Some(Direction::Z), None] {
         let map = table(&CLASSES, up);
-        let (marks, local_up) = seen(&map, &elsewhere(), 2);
+        let (marks, local_up) = local_objects(&map, &any_other_pose(), 2);
         let found = Layout::new(marks, local_up, &map, false).align(|_| Some(AGREES)).unwrap().0;
-        let error = found.known_from_local.between(&elsewhere());
+        let error = found.known_from_local.between(&any_other_pose());
         assert!(error.log().norm() < 1e-6, "{up:?} {error:?}");
         assert_eq!(found.matches.len(), 6);
         assert!(found.matches.iter().all(|(local, known)| local.0 + 10 == known.0), "{:?}", found.matches);
@@ -80,22 +84,23 @@ fn what_looks_the_same_from_two_sides_is_nowhere() {
     let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     let bottles = square.iter().zip(10..).map(|([x, y], id)| object(id, "bottle", Vector3::new(*x, *y, 0.0)));
     let map = PriorMap::new(Some(Direction::Z), bottles.collect());
-    let (marks, up) = seen(&map, &elsewhere(), 0);
+    let (marks, up) = local_objects(&map, &any_other_pose(), 0);
     assert!(Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).is_none());
     // ids resolve the symmetry
-    let (mut marks, up) = seen(&map, &elsewhere(), 0);
+    let (mut marks, up) = local_objects(&map, &any_other_pose(), 0);
     marks.iter_mut().for_each(|mark| mark.id.0 += 10);
     let found = Layout::new(marks, up, &map, true).align(|_| Some(AGREES)).unwrap().0;
-    assert!(found.known_from_local.between(&elsewhere()).log().norm() < 1e-6);
+    assert!(found.known_from_local.between(&any_other_pose()).log().norm() < 1e-6);
 }
 
 #[test]
 fn a_place_is_one_where_boxes_agree_with_it() {
     let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     let map = floor(square.map(|place| (place, "bottle")));
-    let (marks, up) = seen(&map, &elsewhere(), 0);
+    let (marks, up) = local_objects(&map, &any_other_pose(), 0);
     let layout = Layout::new(marks, up, &map, false);
-    let is_right = |aligned: &Aligned| aligned.known_from_local.between(&elsewhere()).log().norm() < 0.1;
+    let is_right =
+        |aligned: &AlignedLayout| aligned.known_from_local.between(&any_other_pose()).log().norm() < 0.1;
     let found = layout.align(|aligned| is_right(aligned).then_some(AGREES)).unwrap().0;
     assert!(is_right(&found), "{found:?}");
     // other poses are possible as well
@@ -110,21 +115,21 @@ fn a_place_is_one_where_boxes_agree_with_it() {
 #[test]
 fn too_few_objects_or_others_are_nowhere() {
     let map = table(&CLASSES, Some(Direction::Z));
-    let (marks, up) = seen(&map, &elsewhere(), 5);
+    let (marks, up) = local_objects(&map, &any_other_pose(), 5);
     assert!(Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).is_none());
-    let (marks, up) = seen(&table(&["laptop"], map.up), &elsewhere(), 0);
+    let (marks, up) = local_objects(&table(&["laptop"], map.up), &any_other_pose(), 0);
     assert!(Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).is_none());
     assert!(Layout::new(vec![], up, &map, false).align(|_| Some(AGREES)).is_none());
-    let (marks, up) = seen(&map, &elsewhere(), 0);
+    let (marks, up) = local_objects(&map, &any_other_pose(), 0);
     assert!(Layout::new(marks, up, &PriorMap::default(), false).align(|_| Some(AGREES)).is_none());
 }
 
 #[test]
 fn tilt_is_known_better_than_heading() {
     let map = table(&CLASSES, Some(Direction::Z));
-    let (marks, up) = seen(&map, &elsewhere(), 0);
+    let (marks, up) = local_objects(&map, &any_other_pose(), 0);
     let found = Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).unwrap().0;
-    let level = Se3::new(elsewhere().rotation.inverse(), Vector3::zeros());
+    let level = Se3::new(any_other_pose().rotation.inverse(), Vector3::zeros());
     let information = found.noise(&level).unwrap().information_matrix(6).unwrap();
     assert!(information[(0, 0)] > 2.0 * information[(2, 2)], "{information}");
 }
@@ -136,26 +141,30 @@ fn the_next_best_place_is_that_of_a_room_that_is_nearly_the_same_from_two_sides(
     let classes = ["cup", "book", "bottle", "laptop", "cup"];
     let both = half.iter().zip(classes).flat_map(|([x, y], class)| [([*x, *y], class), ([-x, -y], class)]);
     let map = floor(both.chain([([0.9, -1.5], "laptop"), ([-0.9, 1.5], "book")]));
-    let (marks, up) = seen(&map, &elsewhere(), 0);
+    let (marks, up) = local_objects(&map, &any_other_pose(), 0);
     let layout = Layout::new(marks, up, &map, false);
-    let ranked = layout.ranked();
+    let ranked = layout.ranked_poses();
     let half_turn = Se3::new(So3::exp(&Vector3::new(0.0, 0.0, std::f64::consts::PI)), Vector3::zeros());
     let [first, second] = [&ranked[0], &ranked[1]];
-    assert!(first.1.between(&elsewhere()).log().norm() < 1e-6, "{first:?}");
-    assert!(second.1.between(&half_turn.compose(&elsewhere())).log().norm() < 1e-6, "{second:?}");
+    assert!(first.1.between(&any_other_pose()).log().norm() < 1e-6, "{first:?}");
+    assert!(second.1.between(&half_turn.compose(&any_other_pose())).log().norm() < 1e-6, "{second:?}");
     assert_eq!((first.2.len(), second.2.len()), (12, 10));
     // two more matches, and two marks without a match
     let gain = layout.gain(&first.1, &first.2[0]).unwrap();
-    assert!((first.0 - second.0 - 2.0 * (gain + NEW)).abs() < 2.0, "{} {gain}", first.0 - second.0);
+    assert!(
+        (first.0 - second.0 - 2.0 * (gain + UNMATCHED_COST)).abs() < 2.0,
+        "{} {gain}",
+        first.0 - second.0
+    );
 }
 
 #[test]
 fn many_objects_of_one_class_are_found_again() {
     let map = floor(scattered(70).map(|place| (place, "bottle")));
     for without in [0, 50] {
-        let (marks, up) = seen(&map, &elsewhere(), without);
+        let (marks, up) = local_objects(&map, &any_other_pose(), without);
         let found = Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).unwrap().0;
-        assert!(found.known_from_local.between(&elsewhere()).log().norm() < 1e-6, "{found:?}");
+        assert!(found.known_from_local.between(&any_other_pose()).log().norm() < 1e-6, "{found:?}");
         assert_eq!(found.matches.len(), 70 - without);
     }
 }
@@ -163,10 +172,10 @@ fn many_objects_of_one_class_are_found_again() {
 #[test]
 fn what_has_no_class_may_be_anything() {
     let map = table(&CLASSES, Some(Direction::Z));
-    let (mut marks, up) = seen(&map, &elsewhere(), 0);
+    let (mut marks, up) = local_objects(&map, &any_other_pose(), 0);
     marks.iter_mut().for_each(|mark| mark.classes.clear());
-    let found = Layout::new(marks, up, &map, false).ranked().remove(0);
-    assert!(found.1.between(&elsewhere()).log().norm() < 1e-6, "{found:?}");
+    let found = Layout::new(marks, up, &map, false).ranked_poses().remove(0);
+    assert!(found.1.between(&any_other_pose()).log().norm() < 1e-6, "{found:?}");
     assert_eq!(found.2.len(), 8);
 }
 
@@ -175,9 +184,9 @@ fn one_pair_or_none_is_no_place() {
     let map = table(&CLASSES, Some(Direction::Z));
     for up in [map.up, None] {
         let map = PriorMap::new(up, map.objects.clone());
-        let (marks, up) = seen(&map, &elsewhere(), 0);
+        let (marks, up) = local_objects(&map, &any_other_pose(), 0);
         let layout = Layout::new(marks, up, &map, false);
-        assert!(layout.place(&[]).is_none() && layout.place(&layout.pairs[..1]).is_none());
+        assert!(layout.fit_pose(&[]).is_none() && layout.fit_pose(&layout.pairs[..1]).is_none());
     }
 }
 
@@ -187,12 +196,12 @@ fn matches_are_within_reach_of_the_place_that_they_are_told_with() {
     let map = table(&["cup"], Some(Direction::Z));
     let mut looked_at = 0;
     for draw in 0..40 {
-        let (mut marks, up) = seen(&map, &elsewhere(), 0);
+        let (mut marks, up) = local_objects(&map, &any_other_pose(), 0);
         for (mark, [x, y]) in marks.iter_mut().zip(scattered(8 * (draw + 1)).skip(8 * draw as usize)) {
             mark.centre += 9.0 * mark.sigma * Vector3::new(x / 8.0 - 0.5, y / 8.0 - 0.5, 0.0);
         }
         let layout = Layout::new(marks, up, &map, false);
-        for (_, place, matches) in layout.ranked() {
+        for (_, place, matches) in layout.ranked_poses() {
             looked_at += 1;
             assert!(matches.iter().all(|pair| layout.gain(&place, pair).is_some()));
         }
