@@ -25,11 +25,13 @@ pub enum Failure {
         /// A remedy.
         help: Option<String>,
     },
-    /// A folder of data that does not exist: exit code 3.
+    /// A folder that does not exist, or does not have the expected files: exit code 3.
     #[error("{message}")]
     NotThere {
-        /// The folder, the places searched, and a remedy.
+        /// The error.
         message: String,
+        /// A remedy.
+        help: Option<String>,
     },
     /// A file that could not be read or written: exit code 3.
     #[error("{}: {source}", path.display())]
@@ -80,21 +82,22 @@ impl Failure {
     /// Prints the failure on stderr with its source line, and also as JSON on stdout if `as_json` is set.
     pub fn show(&self, as_json: bool) {
         if as_json {
-            output::json(&self.to_json());
+            output::print_json(&self.to_json());
         }
         for report in self.reports() {
-            output::say_styled(&report);
+            output::print_styled_message(&report);
         }
         if self.omitted() > 0 {
-            output::say(&format!("and {} more errors", self.omitted()));
+            output::print_message(&format!("and {} more errors", self.omitted()));
         }
     }
 
     fn to_json(&self) -> Value {
         let errors: Vec<Value> = match self {
             Self::Documents(list) => list.iter().map(place_as_json).collect(),
-            Self::Input { message, help } => vec![json!({ "message": message, "help": help })],
-            Self::NotThere { message } => vec![json!({ "message": message })],
+            Self::Input { message, help } | Self::NotThere { message, help } => {
+                vec![json!({ "message": message, "help": help })]
+            }
             Self::File { path, source } => {
                 vec![json!({ "message": source.to_string(), "file": path.display().to_string() })]
             }
@@ -116,8 +119,10 @@ impl Failure {
     fn reports(&self) -> Vec<String> {
         match self {
             Self::Documents(list) => list.iter().map(render).collect(),
-            Self::Input { message, help } => vec![fancy(plain(message, help.as_deref()).into())],
-            Self::NotThere { .. } | Self::File { .. } => vec![fancy(plain(&self.to_string(), None).into())],
+            Self::Input { message, help } | Self::NotThere { message, help } => {
+                vec![fancy(plain(message, help.as_deref()).into())]
+            }
+            Self::File { .. } => vec![fancy(plain(&self.to_string(), None).into())],
         }
     }
 }
@@ -132,7 +137,7 @@ impl From<SourceError> for Failure {
     fn from(error: SourceError) -> Self {
         match error {
             SourceError::Format(error) => error.into(),
-            error @ SourceError::NoFolder { .. } => Self::NotThere { message: error.to_string() },
+            error @ SourceError::NoFolder { .. } => Self::NotThere { message: error.to_string(), help: None },
             other => Self::input(other),
         }
     }
@@ -161,12 +166,13 @@ impl From<FolderError> for Failure {
     fn from(error: FolderError) -> Self {
         match error {
             FolderError::Io { path, source } => Self::File { path, source },
-            FolderError::InUse { .. } => {
-                Self::with_help(error, "wait until it has ended, or choose another folder with --out")
-            }
+            FolderError::InUse { .. } => Self::with_help(
+                error,
+                "wait until that command has ended, or choose another folder with --out",
+            ),
             other => Self::with_help(
                 other,
-                "choose another folder with --out; --force writes into this one, over files of the same names",
+                "choose another folder with --out, or write into this one with --force, which overwrites files with the same names",
             ),
         }
     }
