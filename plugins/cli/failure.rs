@@ -137,7 +137,7 @@ impl From<SourceError> for Failure {
     fn from(error: SourceError) -> Self {
         match error {
             SourceError::Format(error) => error.into(),
-            error @ SourceError::NoFolder { .. } => Self::NotThere { message: error.to_string(), help: None },
+            SourceError::NoFolder { name, tried, no_data_folder } => no_folder(&name, &tried, no_data_folder),
             other => Self::input(other),
         }
     }
@@ -197,6 +197,41 @@ impl From<FormatError> for Failure {
     }
 }
 
+/// Largest number of searched folders that are listed.
+const LISTED: usize = 3;
+
+/// The error of a data set that is in none of the folders `tried`.
+fn no_folder(name: &Path, tried: &[PathBuf], no_data_folder: bool) -> Failure {
+    let mut searched: Vec<String> = tried.iter().take(LISTED).map(|path| path.display().to_string()).collect();
+    if tried.len() > LISTED {
+        searched.push(format!("and {} more", tried.len() - LISTED));
+    }
+    let help = match no_data_folder {
+        true => "give the folder of the data sets with --data DIR, or with the environment variable MANIFACTOR_DATA",
+        false => "check the name, and the folder given by --data or MANIFACTOR_DATA",
+    };
+    let message = format!("there is no folder `{}`; searched: {}", name.display(), searched.join(", "));
+    Failure::NotThere { message, help: Some(help.to_owned()) }
+}
+
+/// The remedy for a diagnostic: its own, or one that needs the text of the document.
+fn help(diagnostic: &Diagnostic) -> Option<String> {
+    let is_axis = |known: &[String]| known.iter().map(String::as_str).eq(["name", "options"]);
+    match &diagnostic.fault {
+        Fault::WrongType { expected, found } if expected == "an array" && found == "a table" => {
+            // a header of TOML
+            let line = diagnostic.place.source.text().lines().nth(diagnostic.line().saturating_sub(1))?;
+            let (name, _) = line.trim_start().strip_prefix('[')?.split_once(']')?;
+            Some(format!("write `[[{name}]]`: each entry of the array is a table"))
+        }
+        Fault::UnknownField { known, .. } if is_axis(known) => Some(
+            "an axis has `columns` and `rows`, or `name` and `options`; see `manifactor explain axes`".to_owned(),
+        ),
+        _ => None,
+    }
+    .or_else(|| diagnostic.help())
+}
+
 /// Converts the malformed lines of a file to diagnostics with their positions.
 fn places(mut malformed: Malformed) -> Diagnostics {
     let text = std::mem::take(&mut malformed.text);
@@ -226,7 +261,7 @@ fn places(mut malformed: Malformed) -> Diagnostics {
 fn place_as_json(diagnostic: &Diagnostic) -> Value {
     json!({
         "message": diagnostic.message(),
-        "help": diagnostic.help(),
+        "help": help(diagnostic),
         "file": diagnostic.place.source.name(),
         "line": diagnostic.line(),
         "column": diagnostic.column(),
@@ -236,7 +271,7 @@ fn place_as_json(diagnostic: &Diagnostic) -> Value {
 /// Formats a warning together with its source line.
 pub(crate) fn render(diagnostic: &Diagnostic) -> String {
     let source = &diagnostic.place.source;
-    let help = diagnostic.help();
+    let help = help(diagnostic);
     let message = plain(&diagnostic.message(), help.as_deref());
     if source.text().is_empty() {
         // a file that could not be read has no line to show

@@ -90,7 +90,7 @@ impl Solve {
             let start = format!("start {name} in {}\n", seconds(start));
             let certificate = certificate.map_or_else(String::new, |c| format!("{c}\n"));
             let outcome =
-                report::outcome(&solution.outcome, verbose > 0) + &report::diagnosis(&diagnosis, verbose > 0);
+                report::outcome(&solution.outcome, verbose > 0) + &report::diagnosis(&diagnosis, &solution.outcome, verbose > 0);
             let marginals = marginals.map_or_else(String::new, |m| report::marginals(&m));
             output::print(&(graph_file::summary(&input) + &start + &outcome + &certificate + &marginals));
         }

@@ -87,7 +87,7 @@ impl PictureStyle {
                 let pictures = run_pictures(record, variant, self.width());
                 drawn.pictures += pictures.len();
                 self.write(&out.join(&variant.folder), &pictures, |file| {
-                    watch.show(&format!("drawing {}/{file}", variant.folder));
+                    watch.show(&drawing(&variant.folder, file));
                     interrupt.poll()
                 })?
             };
@@ -98,6 +98,11 @@ impl PictureStyle {
         tracing::info!("all pictures are drawn");
         Ok(drawn)
     }
+}
+
+/// The progress while a file is drawn.
+fn drawing(folder: &str, file: &str) -> String {
+    format!("drawing {folder}/{file}")
 }
 
 /// Progress of the pictures of a run.
@@ -147,6 +152,23 @@ mod tests {
         let mut files: Vec<_> = files.map(|file| file.unwrap().file_name()).collect();
         files.sort_unstable();
         assert_eq!(files, ["latency.png", "latency.svg"]);
+    }
+
+    #[test]
+    fn the_bar_shows_the_file_that_is_drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        let picture = latencies("latency", &[0.1, 0.2], 300.0).unwrap();
+        let bar = indicatif::ProgressBar::hidden();
+        let mut watch = Watch::Bar(bar.clone());
+        let mut shown = vec![];
+        let style = PictureStyle::default();
+        let is_complete = style.write(folder.path(), &[picture], |file| {
+            watch.show(&drawing("boxes", file));
+            shown.push(bar.message());
+            ControlFlow::Continue(())
+        });
+        assert!(is_complete.unwrap());
+        assert_eq!(shown, ["drawing boxes/latency.svg", "drawing boxes/latency.png"]);
     }
 
     #[test]

@@ -80,10 +80,10 @@ pub(crate) fn at_start(found: &AtStart, factors: usize) -> Vec<String> {
     lines
 }
 
-/// A warning about undetermined directions at the estimate. `details` adds the condition number and the
-/// factors with the largest cost.
-pub(crate) fn diagnosis(diagnosis: &Diagnosis, details: bool) -> String {
-    let open = diagnosis.undetermined.as_ref();
+/// A warning about undetermined directions at the estimate, unless the outcome has one already. `details`
+/// adds the condition number and the factors with the largest cost.
+pub(crate) fn diagnosis(diagnosis: &Diagnosis, outcome: &Outcome, details: bool) -> String {
+    let open = diagnosis.undetermined.as_ref().filter(|_| outcome.undetermined.is_none());
     let open = open.map_or_else(String::new, |open| format!("warning: at the estimate {open}\n"));
     if !details {
         return open;
