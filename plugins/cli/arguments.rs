@@ -114,7 +114,7 @@ impl Cli {
     fn threads(&self) -> Result<usize, Failure> {
         let asked = match self.threads {
             Some(threads) => Some(threads.into()),
-            None => asked_of_rayon(std::env::var("RAYON_NUM_THREADS").ok().as_deref())?,
+            None => rayon_threads(std::env::var("RAYON_NUM_THREADS").ok().as_deref())?,
         };
         // rayon's own default reads further environment variables and accepts any number
         Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, NonZero::get)))
@@ -149,7 +149,7 @@ impl Cli {
 const MOST_THREADS: u16 = 1024;
 
 /// Number of threads from RAYON_NUM_THREADS. As in rayon, 0 and text that is not a number count as unset.
-fn asked_of_rayon(variable: Option<&str>) -> Result<Option<usize>, Failure> {
+fn rayon_threads(variable: Option<&str>) -> Result<Option<usize>, Failure> {
     let Some(text) = variable.map(str::trim).filter(|text| !text.is_empty()) else { return Ok(None) };
     let whole = text.bytes().all(|digit| digit.is_ascii_digit());
     match text.parse::<u16>() {
@@ -207,11 +207,11 @@ mod tests {
     #[test]
     fn threads_without_a_bound_are_refused() {
         for nothing in [None, Some(""), Some("0"), Some("-3"), Some("many")] {
-            assert_eq!(asked_of_rayon(nothing).unwrap(), None, "{nothing:?}");
+            assert_eq!(rayon_threads(nothing).unwrap(), None, "{nothing:?}");
         }
-        assert_eq!(asked_of_rayon(Some(" 7 ")).unwrap(), Some(7));
+        assert_eq!(rayon_threads(Some(" 7 ")).unwrap(), Some(7));
         for too_many in ["1025", "99999", "99999999999999999999999"] {
-            let refused = asked_of_rayon(Some(too_many)).unwrap_err().to_string();
+            let refused = rayon_threads(Some(too_many)).unwrap_err().to_string();
             assert!(refused.contains(too_many) && refused.contains("1024"), "{refused}");
         }
     }

@@ -202,12 +202,15 @@ const LISTED: usize = 3;
 
 /// The error of a data set that is in none of the folders `tried`.
 fn no_folder(name: &Path, tried: &[PathBuf], no_data_folder: bool) -> Failure {
-    let mut searched: Vec<String> = tried.iter().take(LISTED).map(|path| path.display().to_string()).collect();
+    let mut searched: Vec<String> =
+        tried.iter().take(LISTED).map(|path| path.display().to_string()).collect();
     if tried.len() > LISTED {
         searched.push(format!("and {} more", tried.len() - LISTED));
     }
     let help = match no_data_folder {
-        true => "give the folder of the data sets with --data DIR, or with the environment variable MANIFACTOR_DATA",
+        true => {
+            "give the folder of the data sets with --data DIR, or with the environment variable MANIFACTOR_DATA"
+        }
         false => "check the name, and the folder given by --data or MANIFACTOR_DATA",
     };
     let message = format!("there is no folder `{}`; searched: {}", name.display(), searched.join(", "));
@@ -225,7 +228,8 @@ fn help(diagnostic: &Diagnostic) -> Option<String> {
             Some(format!("write `[[{name}]]`: each entry of the array is a table"))
         }
         Fault::UnknownField { known, .. } if is_axis(known) => Some(
-            "an axis has `columns` and `rows`, or `name` and `options`; see `manifactor explain axes`".to_owned(),
+            "an axis has `columns` and `rows`, or `name` and `options`; see `manifactor explain axes`"
+                .to_owned(),
         ),
         _ => None,
     }

@@ -89,8 +89,8 @@ impl Solve {
             let name = input.start.typetag_name();
             let start = format!("start {name} in {}\n", seconds(start));
             let certificate = certificate.map_or_else(String::new, |c| format!("{c}\n"));
-            let outcome =
-                report::outcome(&solution.outcome, verbose > 0) + &report::diagnosis(&diagnosis, &solution.outcome, verbose > 0);
+            let outcome = report::outcome(&solution.outcome, verbose > 0)
+                + &report::diagnosis(&diagnosis, &solution.outcome, verbose > 0);
             let marginals = marginals.map_or_else(String::new, |m| report::marginals(&m));
             output::print(&(graph_file::summary(&input) + &start + &outcome + &certificate + &marginals));
         }

@@ -99,6 +99,13 @@ pub(crate) fn root(definitions: &mut Definitions) -> Value {
     let online = definitions.of::<Online>();
     if let Some(Value::Object(properties)) = root.get_mut("properties") {
         properties.insert("online".to_owned(), online);
+        for (field, docs) in
+            [("solver", "The solver. Default: auto."), ("start", "The initial values. Default: given.")]
+        {
+            if let Some(Value::Object(property)) = properties.get_mut(field) {
+                property.entry("description").or_insert_with(|| docs.into());
+            }
+        }
     }
     root
 }

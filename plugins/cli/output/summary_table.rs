@@ -13,7 +13,7 @@ pub(crate) fn of(summary: &Summary) -> String {
         .collect();
     let labels: Vec<&str> = header.iter().take(summary.columns.len()).copied().collect();
     let kept: Vec<&str> = labels.iter().copied().chain(summary.metrics.iter().map(String::as_str)).collect();
-    let mut table = Table::of_numbers(&header).keeping(&kept).naming(labels.len());
+    let mut table = Table::of_numbers(&header).with_priority(&kept).with_name_columns(labels.len());
     for group in &summary.groups {
         let mean = |metric| group.means.get(metric).map_or("-".into(), |mean| format!("{:.5}", mean.mean));
         let counts = [group.trials.to_string(), group.failed.to_string()];

@@ -10,7 +10,7 @@ use manifactor::slam::variance::{BoxComponent, MotionComponent, Score};
 pub(crate) fn of_run(report: &RunReport, details: bool) -> String {
     let header =
         ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "iterations", "time"];
-    let mut table = Table::of_numbers(&header).keeping(&KEPT);
+    let mut table = Table::of_numbers(&header).with_priority(&PRIORITY);
     if let Some(first) = report.variants.first() {
         table.row(before(first));
     }
@@ -78,7 +78,7 @@ const LANDMARKS: &str = "Errors of the objects against the truth. Position: RMSE
                          centres.";
 
 /// Columns that a narrow terminal shows first.
-const KEPT: [&str; 7] = ["ATE (m)", "position (m)", "shape", "quality", "cost", "iterations", "objects"];
+const PRIORITY: [&str; 7] = ["ATE (m)", "position (m)", "shape", "quality", "cost", "iterations", "objects"];
 
 /// For a run frame by frame: the latencies, and the map after the last frame.
 fn stream(variant: &VariantReport) -> String {

@@ -30,7 +30,12 @@ fn documents_and_their_tables_are_explained() {
         ("axes", ["a field of the document experiment", "axes[].rows", "axes[].options", "list of table"]),
         (
             "solver",
-            ["a field of the document graph, run", "manifactor list solver", "Type: solver", "Default"],
+            [
+                "document graph\n\nThe solver",
+                "document run\n",
+                "manifactor list solver",
+                "levenberg_marquardt",
+            ],
         ),
         ("summary.baseline", ["a field of the document experiment", "compared", "Type:", "Default"]),
     ] {

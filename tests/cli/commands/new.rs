@@ -45,7 +45,9 @@ fn a_plugin_is_not_written_over_another_nor_under_a_bad_name() {
     run(["new", "plugin", &path("there")], &[]).ended(2).complains("exists already");
     run(["new", "plugin", &path("On-Shelf")], &[]).ended(2).complains("such as `on_the_shelf`");
     let nowhere = folder.path().display().to_string();
-    run(["new", "plugin", &path("new_one"), "--manifactor", &nowhere], &[]).ended(2).complains("is not a checkout");
+    run(["new", "plugin", &path("new_one"), "--manifactor", &nowhere], &[])
+        .ended(2)
+        .complains("is not a checkout");
     assert!(!folder.path().join("new_one").exists());
     manifactor("new").ended(2).complains("plugin");
     let taken = path("vertical-orientation");
