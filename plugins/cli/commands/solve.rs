@@ -18,6 +18,7 @@ use std::time::Instant;
 
 /// Solve a graph: a literal graph (.toml, .json, .yaml), a pose graph (.g2o, TORO) or bundle adjustment (.bal).
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor solve examples/03_relations/graph.toml --covariances")]
 pub(crate) struct Solve {
     /// The graph.
     graph: PathBuf,
@@ -47,7 +48,7 @@ impl Solve {
         let mut input = self.reading.open(&self.graph, &self.solver)?;
         input.notes.extend(self.what_if.apply(&mut input.graph, &input.values)?);
         for note in &input.notes {
-            output::note(note);
+            output::print_note(note);
         }
         let mut watch = Watch::new(verbose, "solving");
         let mut interrupt = interrupt::on_ctrl_c();
@@ -83,12 +84,13 @@ impl Solve {
             if let Some(certificate) = certificate {
                 json["certificate"] = json!(certificate);
             }
-            output::json(&json);
+            output::print_json(&json);
         } else {
             let name = input.start.typetag_name();
             let start = format!("start {name} in {}\n", seconds(start));
             let certificate = certificate.map_or_else(String::new, |c| format!("{c}\n"));
-            let outcome = report::outcome(&solution.outcome) + &report::diagnosis(&diagnosis);
+            let outcome = report::outcome(&solution.outcome, verbose > 0)
+                + &report::diagnosis(&diagnosis, &solution.outcome, verbose > 0);
             let marginals = marginals.map_or_else(String::new, |m| report::marginals(&m));
             output::print(&(graph_file::summary(&input) + &start + &outcome + &certificate + &marginals));
         }
