@@ -146,7 +146,7 @@ impl Smoother {
     }
 
     /// Solves the whole graph as one batch from the estimate, and returns the values and the report of the
-    /// solver. The session does not change.
+    /// solver. The smoother does not change.
     #[pyo3(signature = (solver = None))]
     fn finish<'py>(
         &self,

@@ -248,7 +248,7 @@ class Smoother:
         """Returns the active factors as a graph, with its fixed variables."""
     def finish(self, solver: Solver | None = None) -> tuple[Values, dict[str, Any]]:
         """Solves the whole graph as one batch from the estimate, and returns the values and the report of
-        the solver. The session does not change."""
+        the solver. The smoother does not change."""
     def save(self) -> str:
         """Returns the smoother as a text. `Smoother.load` restores it bit for bit."""
     def to_rerun(self, path: str | os.PathLike[str] | None = None, *, name: str = "session", every: int = 1) -> Live:

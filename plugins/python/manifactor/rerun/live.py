@@ -44,6 +44,11 @@ class Live:
         self._seen: dict[str, list[tuple[str, list[float]]]] = {}
         self._camera: dict[str, Any] | None = None
 
+    @property
+    def session(self) -> Smoother:
+        """Alias of `smoother`, for code that was written for earlier versions."""
+        return self.smoother
+
     def push(self, graph: Graph, values: Values) -> list[FactorId]:
         """Like `Smoother.push`; boxes of the graph are shown after the next update."""
         ids = self.smoother.push(graph, values)
