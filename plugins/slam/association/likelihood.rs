@@ -1,7 +1,5 @@
 //! Data association by the joint likelihood of box and class.
 mod fit;
-#[cfg(test)]
-mod rail;
 mod second_look;
 mod sightings;
 mod track;
