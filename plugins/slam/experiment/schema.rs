@@ -14,7 +14,7 @@ pub fn run_root(definitions: &mut Definitions) -> Value {
     let mut literal = graph_root(definitions);
     let mut own = json!({ "semantics": definitions.of::<SemanticsDocument>() });
     own["semantics"]["description"] =
-        json!("Which objects get which factors: rules, the name of a shipped table, or a file.");
+        json!("Rules that give factors to objects: a list of rules, the name of a shipped table, or a file.");
     for field in ["variables", "factors"] {
         own[field] = literal["properties"][field].take();
     }
@@ -23,7 +23,7 @@ pub fn run_root(definitions: &mut Definitions) -> Value {
             properties.extend(more.as_object().cloned().into_iter().flatten());
         }
     }
-    titled(root, "A run", "Where data come from, how a graph is built of them, how it is solved.")
+    titled(root, "A run", "Source of the data, settings of the graph, and the solver.")
 }
 
 /// Returns the schema of a file of semantic rules, which runs can name. Its definitions are added to

@@ -50,7 +50,7 @@ impl Default for SummarySettings {
 
 /// Returns the description of `metrics`, with all names.
 fn described() -> String {
-    format!("What is averaged: columns of measures. They are {}.", measure_names_in_words())
+    format!("Measures to average: {}.", measure_names_in_words())
 }
 
 impl SummarySettings {
