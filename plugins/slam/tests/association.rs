@@ -175,8 +175,8 @@ impl Associator for WrongEverySecondFrame {
     }
 }
 
-/// Maps with `WrongEverySecondFrame` and checks that the final map equals the map with the right objects. Returns the
-/// largest number of objects on the way.
+/// Maps with `WrongEverySecondFrame` and checks that the final map equals the map with the right objects.
+/// Returns the largest number of objects on the way.
 fn corrections_now(merges: bool) -> usize {
     let (settings, sequence) = scene(&[]);
     let (given, twofold) =
