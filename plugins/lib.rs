@@ -74,28 +74,28 @@
 //! ```
 //!
 //! # Incremental smoothing
-//! A [`Session`](smoother::Session) updates the estimate while variables and factors are added and removed.
+//! A [`Smoother`](smoother::Smoother) updates the estimate while variables and factors are added and removed.
 //! ```
 //! use manifactor::geometry::{Between, LieGroup, Se2};
-//! use manifactor::smoother::{Session, Settings};
+//! use manifactor::smoother::{Smoother, SmootherSettings};
 //! use manifactor::prelude::*;
 //!
-//! let mut session = Session::new(Settings::default());
+//! let mut smoother = Smoother::new(SmootherSettings::default());
 //! // the first pose is held
 //! let (mut factors, mut values) = (Graph::new(), Values::new());
 //! values.insert("x0", Se2::identity());
 //! factors.fix("x0");
-//! session.push(&factors, &values)?;
-//! session.update()?;
+//! smoother.push(&factors, &values)?;
+//! smoother.update()?;
 //! // a frame: a new pose, where odometry leads, and a factor to it
 //! let (mut factors, mut values) = (Graph::new(), Values::new());
 //! let relative = Se2::exp(&Vector3::new(1.0, 0.0, 0.1));
-//! values.insert("x1", Se2::compose(&session.get("x0")?, &relative));
+//! values.insert("x1", Se2::compose(&smoother.get("x0")?, &relative));
 //! factors.add(["x0", "x1"], Between { relative }).noise(Noise::sigma(0.1)?);
-//! let ids = session.push(&factors, &values)?;
-//! let report = session.update()?;
-//! let pose: Se2 = session.get("x1")?;
-//! assert_eq!((ids.len(), report.parked.len()), (1, 0));
+//! let ids = smoother.push(&factors, &values)?;
+//! let report = smoother.update()?;
+//! let pose: Se2 = smoother.get("x1")?;
+//! assert_eq!((ids.len(), report.undetermined_variables.len()), (1, 0));
 //! assert!((pose.translation.x - 1.0).abs() < 0.01);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -149,7 +149,7 @@ pub mod prelude {
     pub use manifactor_graph::prelude::*;
     pub use manifactor_solve::{
         Auto, Descent, Dogleg, GaussNewton, Gnc, Interrupt, LevenbergMarquardt, Observer, Optimizer, Outcome,
-        Problem, Silent, Solution, Start, StartError, Step, Stopping, Termination, Tried, solve,
+        Problem, Silent, Solution, Start, StartError, Stopping, Termination, TrialResult, TrialStep, solve,
     };
 }
 

@@ -21,7 +21,7 @@ pub(crate) fn apply(root: &mut Node, text: &str, errors: &Errors) {
         Ok((steps, _)) if steps.len() > MAX_DEPTH => errors.push(too_deep(source.place(0..text.len()))),
         Ok((steps, value)) => {
             let Some(value) = read(&source, value, errors) else { return };
-            if let Err((place, problem)) = put(root, &steps, value, &source) {
+            if let Err((place, problem)) = set_value(root, &steps, value, &source) {
                 errors.report(place, problem);
             }
         }
@@ -92,7 +92,12 @@ fn split(text: &str) -> Result<(Vec<Step>, Range<usize>), (usize, String)> {
 }
 
 /// Walks to the last step and sets the value there.
-fn put(root: &mut Node, steps: &[Step], value: Node, source: &SourceText) -> Result<(), (Place, Fault)> {
+fn set_value(
+    root: &mut Node,
+    steps: &[Step],
+    value: Node,
+    source: &SourceText,
+) -> Result<(), (Place, Fault)> {
     let mut node = root;
     let mut done = 0;
     for step in steps {

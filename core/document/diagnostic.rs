@@ -66,7 +66,7 @@ impl fmt::Display for Diagnostic {
 impl std::error::Error for Diagnostic {}
 
 /// Largest number of diagnostics in a list. Further ones are only counted.
-const TOLD: usize = 200;
+const MAX_DIAGNOSTICS: usize = 200;
 
 /// All errors of a document, sorted by position. Never empty.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,8 +81,8 @@ impl Diagnostics {
     pub fn from_list(mut list: Vec<Diagnostic>) -> Option<Self> {
         list.sort_by(|a, b| a.order().cmp(&b.order()));
         list.dedup();
-        let omitted = list.len().saturating_sub(TOLD);
-        list.truncate(TOLD);
+        let omitted = list.len().saturating_sub(MAX_DIAGNOSTICS);
+        list.truncate(MAX_DIAGNOSTICS);
         (!list.is_empty()).then_some(Diagnostics { list, omitted })
     }
 

@@ -48,18 +48,18 @@ pub fn deserialize_with<'de, T: 'static, D: Deserializer<'de>>(
     read: Run,
 ) -> Result<T, D::Error> {
     SLOT.set(Slot::Run(read));
-    deserializer.deserialize_newtype_struct(NODE, Handed(read, PhantomData))
+    deserializer.deserialize_newtype_struct(NODE, NodeVisitor(read, PhantomData))
 }
 
-struct Handed<T>(Run, PhantomData<T>);
+struct NodeVisitor<T>(Run, PhantomData<T>);
 
-impl<T: 'static> Handed<T> {
+impl<T: 'static> NodeVisitor<T> {
     fn unpack<E: Error>(done: Box<dyn Any>) -> Result<T, E> {
         done.downcast().map(|value| *value).map_err(|_| E::custom("read as another type"))
     }
 }
 
-impl<'de, T: 'static> Visitor<'de> for Handed<T> {
+impl<'de, T: 'static> Visitor<'de> for NodeVisitor<T> {
     type Value = T;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

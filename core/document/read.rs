@@ -13,12 +13,12 @@ impl Node {
     /// removes the field with the error and reads again.
     pub fn read<T: DeserializeOwned>(&self, errors: &Errors) -> Option<T> {
         let before = errors.len();
-        self.read_what_is_right(&[], errors).filter(|_| errors.len() == before)
+        self.read_partial(&[], errors).filter(|_| errors.len() == before)
     }
 
     /// Reads a serde type like [`read`](Self::read), but returns a value even if fields with errors had to be
     /// removed, for checks that do not need them. `others` are fields of this table that are read elsewhere.
-    pub fn read_what_is_right<T: DeserializeOwned>(&self, others: &[String], errors: &Errors) -> Option<T> {
+    pub fn read_partial<T: DeserializeOwned>(&self, others: &[String], errors: &Errors) -> Option<T> {
         let before = errors.len();
         self.report_not_finite(errors);
         if errors.len() > before {
@@ -37,17 +37,19 @@ impl Node {
             {
                 known.extend_from_slice(others);
             }
-            let is_told = rest.explains(&place, &fault);
-            let goes_on = rest.cut(&place, &fault, failure.is_unread_field());
-            if !is_told {
+            let is_explained = rest.explains(&place, &fault);
+            let continues = rest.cut(&place, &fault, failure.is_unread_field());
+            if !is_explained {
                 errors.report(place, fault);
             }
-            let goes_on = goes_on && errors.len() < before + MOST;
-            if errors.len() >= before + MOST {
-                errors
-                    .report(self.place.clone(), Fault::invalid(format!("has more errors than these {MOST}")));
+            let continues = continues && errors.len() < before + MAX_ERRORS;
+            if errors.len() >= before + MAX_ERRORS {
+                errors.report(
+                    self.place.clone(),
+                    Fault::invalid(format!("has more errors than these {MAX_ERRORS}")),
+                );
             }
-            failure = match goes_on.then(|| rest.node.try_read::<T>()) {
+            failure = match continues.then(|| rest.node.try_read::<T>()) {
                 Some(Err(next)) => next,
                 Some(Ok(value)) => return Some(value),
                 None => return None,
@@ -83,7 +85,7 @@ impl Node {
 }
 
 /// Largest number of errors per type. Each one costs a further reading.
-const MOST: usize = 100;
+const MAX_ERRORS: usize = 100;
 
 /// The remaining node after fields with errors were removed.
 struct Rest {
@@ -213,10 +215,10 @@ mod tests {
     }
 
     #[test]
-    fn all_errors_are_told_up_to_a_bound() {
-        assert_eq!(errors_of(MOST - 1), MOST - 1);
+    fn all_errors_are_reported_up_to_a_bound() {
+        assert_eq!(errors_of(MAX_ERRORS - 1), MAX_ERRORS - 1);
         // each error costs a reading of everything; without a limit, a large file of errors would take hours.
         // The last error reports that there are more
-        assert_eq!(errors_of(3 * MOST), MOST + 1);
+        assert_eq!(errors_of(3 * MAX_ERRORS), MAX_ERRORS + 1);
     }
 }

@@ -13,7 +13,7 @@ pub struct ReadError(Box<Inner>);
 #[derive(Debug, Clone, PartialEq)]
 enum Inner {
     /// An error without a position so far.
-    Unplaced(What),
+    Unplaced(SerdeError),
     Placed {
         place: Place,
         fault: Fault,
@@ -23,7 +23,7 @@ enum Inner {
 
 /// An error of serde before its node is known.
 #[derive(Debug, Clone, PartialEq)]
-enum What {
+enum SerdeError {
     Type { expected: String, found: String },
     Length { expected: String, found: usize },
     Variant { name: String, known: Vec<String> },
@@ -64,16 +64,16 @@ impl ReadError {
     #[must_use]
     pub fn at(self, node: &Node) -> Self {
         let Inner::Unplaced(what) = &*self.0 else { return self };
-        let unread = matches!(what, What::Field { .. });
+        let unread = matches!(what, SerdeError::Field { .. });
         Self(Box::new(Inner::Placed { place: what.place(node), fault: what.fault(Some(node)), unread }))
     }
 
-    fn unplaced(what: What) -> Self {
+    fn unplaced(what: SerdeError) -> Self {
         Self(Box::new(Inner::Unplaced(what)))
     }
 }
 
-impl What {
+impl SerdeError {
     fn place(&self, node: &Node) -> Place {
         let found = match (self, &node.value) {
             (Self::Field { name, .. } | Self::Variant { name, .. }, Value::Table(table)) => {
@@ -116,11 +116,11 @@ impl Error for ReadError {
     fn custom<T: fmt::Display>(message: T) -> Self {
         let message = message.to_string();
         let line = message.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
-        Self::unplaced(What::Message(line.trim().to_owned()))
+        Self::unplaced(SerdeError::Message(line.trim().to_owned()))
     }
 
     fn invalid_type(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
-        Self::unplaced(What::Type { expected: expected.to_string(), found: found.to_string() })
+        Self::unplaced(SerdeError::Type { expected: expected.to_string(), found: found.to_string() })
     }
 
     fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
@@ -128,32 +128,32 @@ impl Error for ReadError {
     }
 
     fn invalid_length(found: usize, expected: &dyn Expected) -> Self {
-        Self::unplaced(What::Length { expected: expected.to_string(), found })
+        Self::unplaced(SerdeError::Length { expected: expected.to_string(), found })
     }
 
     fn unknown_variant(name: &str, known: &'static [&'static str]) -> Self {
-        Self::unplaced(What::Variant { name: name.to_owned(), known: owned(known) })
+        Self::unplaced(SerdeError::Variant { name: name.to_owned(), known: owned(known) })
     }
 
     fn unknown_field(name: &str, known: &'static [&'static str]) -> Self {
-        Self::unplaced(What::Field { name: name.to_owned(), known: owned(known) })
+        Self::unplaced(SerdeError::Field { name: name.to_owned(), known: owned(known) })
     }
 
     fn missing_field(name: &'static str) -> Self {
-        Self::unplaced(What::Missing { name: name.to_owned() })
+        Self::unplaced(SerdeError::Missing { name: name.to_owned() })
     }
 }
 
 /// Converts a fault within a string of the node.
 impl From<TextError> for ReadError {
     fn from(error: TextError) -> Self {
-        Self::unplaced(What::Text(error))
+        Self::unplaced(SerdeError::Text(error))
     }
 }
 
 impl fmt::Display for ReadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Inner::Unplaced(What::Text(error)) = &*self.0 {
+        if let Inner::Unplaced(SerdeError::Text(error)) = &*self.0 {
             return error.fmt(f);
         }
         let fault = self.fault();

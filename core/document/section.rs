@@ -14,7 +14,7 @@ pub struct Section<'e> {
     errors: &'e Errors,
     node: &'e Node,
     /// The fields that were requested, in order.
-    asked: Vec<String>,
+    requested: Vec<String>,
     /// Required fields that are missing. They are reported at the end, when the unknown fields are known.
     missing: Vec<String>,
 }
@@ -27,7 +27,7 @@ impl<'e> Section<'e> {
             errors.report(node.place.clone(), Fault::wrong_type("a table", node.in_words()));
             return None;
         }
-        Some(Section { errors, node, asked: Vec::new(), missing: Vec::new() })
+        Some(Section { errors, node, requested: Vec::new(), missing: Vec::new() })
     }
 
     /// Returns the collector of errors.
@@ -46,9 +46,9 @@ impl<'e> Section<'e> {
         self.node.field(field).unwrap_or(self.node).place.clone()
     }
 
-    /// Returns whether a field exists and was not taken yet.
+    /// Returns whether a field exists and was not requested yet.
     pub fn has(&self, field: &str) -> bool {
-        self.node.field(field).is_some() && !self.is_asked(field)
+        self.node.field(field).is_some() && !self.is_requested(field)
     }
 
     /// Reports a problem with a field, or with the table if the field is missing.
@@ -56,18 +56,18 @@ impl<'e> Section<'e> {
         self.errors.report(self.place_of(field), problem);
     }
 
-    /// Takes a field without reading it. Returns `None` if it is missing, null, or was already taken.
-    pub fn take(&mut self, field: &str) -> Option<&'e Node> {
-        if self.is_asked(field) {
+    /// Requests a field without reading it. Returns `None` if it is missing, null, or was already requested.
+    pub fn optional_node(&mut self, field: &str) -> Option<&'e Node> {
+        if self.is_requested(field) {
             return None;
         }
-        self.asked.push(field.to_owned());
+        self.requested.push(field.to_owned());
         self.node.field(field).filter(|node| node.value != Value::Null)
     }
 
-    /// Takes a field without reading it. A missing field is an error.
-    pub(crate) fn take_required(&mut self, field: &str) -> Option<&'e Node> {
-        let node = self.take(field);
+    /// Requests a field without reading it. A missing field is an error.
+    pub(crate) fn required_node(&mut self, field: &str) -> Option<&'e Node> {
+        let node = self.optional_node(field);
         if node.is_none() {
             self.missing.push(field.to_owned());
         }
@@ -76,12 +76,12 @@ impl<'e> Section<'e> {
 
     /// Reads a required field.
     pub fn required<T: DeserializeOwned>(&mut self, field: &str) -> Option<T> {
-        self.take_required(field)?.read(self.errors)
+        self.required_node(field)?.read(self.errors)
     }
 
     /// Reads an optional field.
     pub fn optional<T: DeserializeOwned>(&mut self, field: &str) -> Option<T> {
-        self.take(field)?.read(self.errors)
+        self.optional_node(field)?.read(self.errors)
     }
 
     /// Reads a field with a default. Returns the default also after an error.
@@ -91,24 +91,24 @@ impl<'e> Section<'e> {
 
     /// Starts to read a required table.
     pub fn section(&mut self, field: &str) -> Option<Section<'e>> {
-        Section::new(self.take_required(field)?, self.errors)
+        Section::new(self.required_node(field)?, self.errors)
     }
 
     /// Starts to read an optional table.
     pub fn optional_section(&mut self, field: &str) -> Option<Section<'e>> {
-        Section::new(self.take(field)?, self.errors)
+        Section::new(self.optional_node(field)?, self.errors)
     }
 
-    /// Takes the elements of an optional array; empty if it is missing.
+    /// Requests the elements of an optional array; empty if it is missing.
     pub fn nodes(&mut self, field: &str) -> &'e [Node] {
-        let taken = self.take(field);
-        self.elements(taken)
+        let node = self.optional_node(field);
+        self.elements(node)
     }
 
-    /// Takes the elements of a required array, which may be empty.
+    /// Requests the elements of a required array, which may be empty.
     pub fn required_nodes(&mut self, field: &str) -> &'e [Node] {
-        let taken = self.take_required(field);
-        self.elements(taken)
+        let node = self.required_node(field);
+        self.elements(node)
     }
 
     fn elements(&self, node: Option<&'e Node>) -> &'e [Node] {
@@ -125,20 +125,21 @@ impl<'e> Section<'e> {
 
     /// Reads all remaining fields as one serde type. It should deny unknown fields.
     pub fn rest<T: DeserializeOwned>(mut self) -> Option<T> {
-        let left = self.left().into_iter().map(|(name, field)| (name.clone(), field.clone())).collect();
-        let rest = Node::new(self.node.place.clone(), Value::Table(Box::new(left)));
+        let unread =
+            self.unread_fields().into_iter().map(|(name, field)| (name.clone(), field.clone())).collect();
+        let rest = Node::new(self.node.place.clone(), Value::Table(Box::new(unread)));
         let before = self.errors.len();
-        let asked = std::mem::take(&mut self.asked);
-        rest.read_what_is_right(&asked, self.errors).filter(|_| self.errors.len() == before)
+        let requested = std::mem::take(&mut self.requested);
+        rest.read_partial(&requested, self.errors).filter(|_| self.errors.len() == before)
     }
 
     /// Reports each field that was not requested.
     pub fn finish(mut self) {
-        for (field, value) in self.left() {
+        for (field, value) in self.unread_fields() {
             // a misspelled field is not reported as missing as well
-            let meant = nearest(field, self.asked.iter().map(String::as_str));
+            let meant = nearest(field, self.requested.iter().map(String::as_str));
             self.missing.retain(|missing| Some(missing.as_str()) != meant);
-            let problem = Fault::UnknownField { field: field.clone(), known: self.asked.clone() };
+            let problem = Fault::UnknownField { field: field.clone(), known: self.requested.clone() };
             self.errors.report(value.key.clone(), problem);
         }
     }
@@ -146,14 +147,14 @@ impl<'e> Section<'e> {
     /// Drops the remaining fields without an error.
     pub fn ignore_rest(self) {}
 
-    fn is_asked(&self, field: &str) -> bool {
-        self.asked.iter().any(|name| name == field)
+    fn is_requested(&self, field: &str) -> bool {
+        self.requested.iter().any(|name| name == field)
     }
 
     /// Returns the fields that were not requested.
-    fn left(&self) -> Vec<(&'e String, &'e Field)> {
+    fn unread_fields(&self) -> Vec<(&'e String, &'e Field)> {
         let Value::Table(table) = &self.node.value else { return Vec::new() };
-        table.iter().filter(|(name, _)| !self.is_asked(name)).collect()
+        table.iter().filter(|(name, _)| !self.is_requested(name)).collect()
     }
 }
 

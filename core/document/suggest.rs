@@ -1,16 +1,16 @@
 //! Suggestions of existing names for an unknown name.
 
 /// Largest number of names in a message.
-const LISTED: usize = 30;
+const MAX_LISTED: usize = 30;
 
 /// Smallest number of letters that count as the beginning of a name.
-const BEGINNING: usize = 3;
+const MIN_PREFIX: usize = 3;
 
 /// Returns the known name that is closest to `name`, if it is similar enough or begins with `name`.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let wanted = normal(name);
     let letters = wanted.chars().count();
-    let begins = |k: &str| letters >= BEGINNING && normal(k).starts_with(&wanted);
+    let begins = |k: &str| letters >= MIN_PREFIX && normal(k).starts_with(&wanted);
     known
         .into_iter()
         .map(|k| (strsim::damerau_levenshtein(&wanted, &normal(k)), k))
@@ -39,8 +39,8 @@ pub fn advice(name: &str, known: &[String]) -> Option<String> {
 
 /// Formats a list: `` `a`, `b` and `c` ``.
 pub(crate) fn list(names: &[String]) -> String {
-    let quoted: Vec<String> = names.iter().take(LISTED).map(|n| format!("`{n}`")).collect();
-    match (names.len().saturating_sub(LISTED), quoted.split_last()) {
+    let quoted: Vec<String> = names.iter().take(MAX_LISTED).map(|n| format!("`{n}`")).collect();
+    match (names.len().saturating_sub(MAX_LISTED), quoted.split_last()) {
         (more @ 1.., _) => format!("{} and {more} more", quoted.join(", ")),
         (0, Some((last, rest))) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
         _ => quoted.concat(),

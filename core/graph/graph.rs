@@ -43,8 +43,8 @@ pub enum Fixed {
 
 impl<'de> Deserialize<'de> for Fixed {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        struct Either;
-        impl<'de> Visitor<'de> for Either {
+        struct FixedVisitor;
+        impl<'de> Visitor<'de> for FixedVisitor {
             type Value = Fixed;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("true, false, or an array of directions of the tangent space")
@@ -56,7 +56,7 @@ impl<'de> Deserialize<'de> for Fixed {
                 Deserialize::deserialize(SeqAccessDeserializer::new(names)).map(Fixed::Directions)
             }
         }
-        from.deserialize_any(Either)
+        from.deserialize_any(FixedVisitor)
     }
 }
 
@@ -183,10 +183,10 @@ pub enum GraphError {
 impl GraphError {
     /// Formats the first errors, one per line, and the number of the remaining ones.
     pub fn list(errors: &[Self]) -> String {
-        const SHOWN: usize = 20;
-        let mut text: String = errors.iter().take(SHOWN).map(|e| format!("\n  {e}")).collect();
-        if errors.len() > SHOWN {
-            text += &format!("\n  and {} more", errors.len() - SHOWN);
+        const MAX_LISTED: usize = 20;
+        let mut text: String = errors.iter().take(MAX_LISTED).map(|e| format!("\n  {e}")).collect();
+        if errors.len() > MAX_LISTED {
+            text += &format!("\n  and {} more", errors.len() - MAX_LISTED);
         }
         text
     }

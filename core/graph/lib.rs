@@ -25,7 +25,7 @@ pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, signature};
 pub use graph::{Fixed, Graph, GraphError, Resolved, VariableIndices, Version};
 pub use manifactor_document::TextError;
 pub use noise::Noise;
-pub use registry::{catalogue, checked};
+pub use registry::{TypeName, UnknownType, catalogue, checked};
 pub use residual::{Jacobians, Lifted, List, Many, Refs, Residual, Variables, normal_equations};
 pub use variable::{AsVariable, ErasedManifold, Variable, as_variable, column, manifold_name};
 pub use variable::{Key, Manifold, Tangent, ValueError, Values};

@@ -80,7 +80,7 @@ pub trait LossColumn: Send + Sync {
     /// Replaces loss `index` by the last one.
     fn swap_remove(&mut self, index: usize);
     /// Replaces the squared norms of the factors from `first` on by weights. Returns ½ Σ ρ.
-    fn weigh(&self, first: usize, squared: &mut [f64]) -> f64;
+    fn weights_from_norms(&self, first: usize, squared: &mut [f64]) -> f64;
 }
 
 impl<L: RobustLoss> LossColumn for Plain<L> {
@@ -93,7 +93,7 @@ impl<L: RobustLoss> LossColumn for Plain<L> {
     fn swap_remove(&mut self, index: usize) {
         self.0.swap_remove(index);
     }
-    fn weigh(&self, first: usize, squared: &mut [f64]) -> f64 {
+    fn weights_from_norms(&self, first: usize, squared: &mut [f64]) -> f64 {
         let mut cost = 0.0;
         for (s, loss) in squared.iter_mut().zip(&self.0[first..]) {
             let (rho, weight) = RobustLoss::rho(loss, *s);

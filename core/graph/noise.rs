@@ -16,15 +16,15 @@ pub(crate) use whiteners::Whiteners;
 /// `{ information = [[…], […]] }` or `{}`. Add `observed = [true, false, …]` if some rows of the residual
 /// were not measured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "Spec", into = "Spec")]
-#[schemars(with = "Spec")]
+#[serde(try_from = "NoiseDocument", into = "NoiseDocument")]
+#[schemars(with = "NoiseDocument")]
 pub struct Noise {
-    model: Model,
+    model: NoiseModel,
     observed: Option<Vec<bool>>,
 }
 
 #[derive(Debug, Clone, Default, PartialEq)]
-enum Model {
+enum NoiseModel {
     #[default]
     Unit,
     Isotropic(f64),
@@ -37,7 +37,7 @@ enum Model {
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Noise")]
-struct Spec {
+struct NoiseDocument {
     /// Standard deviation of every row, in the units of the row.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     sigma: Option<f64>,
@@ -171,28 +171,28 @@ impl Noise {
     /// # Errors
     /// If it is not a positive number.
     pub fn sigma(s: f64) -> Result<Self, NoiseError> {
-        Ok(Model::Isotropic(sigma(s)?).into())
+        Ok(NoiseModel::Isotropic(sigma(s)?).into())
     }
     /// Makes a noise with one standard deviation for each row.
     ///
     /// # Errors
     /// If one is not a positive number.
     pub fn sigmas(s: &[f64]) -> Result<Self, NoiseError> {
-        Ok(Model::Diagonal(s.iter().map(|s| sigma(*s)).collect::<Result<_, _>>()?).into())
+        Ok(NoiseModel::Diagonal(s.iter().map(|s| sigma(*s)).collect::<Result<_, _>>()?).into())
     }
     /// Makes a noise from a covariance matrix.
     ///
     /// # Errors
     /// If it is not symmetric and positive definite.
     pub fn covariance(m: DMatrix<f64>) -> Result<Self, NoiseError> {
-        Ok(Model::Covariance(spd(m)?).into())
+        Ok(NoiseModel::Covariance(spd(m)?).into())
     }
     /// Makes a noise from an information matrix, the inverse of a covariance.
     ///
     /// # Errors
     /// If it is not symmetric and positive definite.
     pub fn information(m: DMatrix<f64>) -> Result<Self, NoiseError> {
-        Ok(Model::Information(spd(m)?).into())
+        Ok(NoiseModel::Information(spd(m)?).into())
     }
     /// Returns this noise for a measurement of the marked rows only. The remaining rows are marginalised.
     #[must_use]
@@ -208,13 +208,13 @@ impl Noise {
     pub fn weighted(&self, weight: f64) -> Result<Self, NoiseError> {
         let spread = sigma(weight)?.sqrt().recip();
         let model = match &self.model {
-            Model::Unit => Model::Isotropic(sigma(spread)?),
-            Model::Isotropic(s) => Model::Isotropic(sigma(s * spread)?),
-            Model::Diagonal(s) => {
-                Model::Diagonal(s.iter().map(|s| sigma(s * spread)).collect::<Result<_, _>>()?)
+            NoiseModel::Unit => NoiseModel::Isotropic(sigma(spread)?),
+            NoiseModel::Isotropic(s) => NoiseModel::Isotropic(sigma(s * spread)?),
+            NoiseModel::Diagonal(s) => {
+                NoiseModel::Diagonal(s.iter().map(|s| sigma(s * spread)).collect::<Result<_, _>>()?)
             }
-            Model::Covariance(m) => Model::Covariance(spd(m / weight)?),
-            Model::Information(m) => Model::Information(spd(m * weight)?),
+            NoiseModel::Covariance(m) => NoiseModel::Covariance(spd(m / weight)?),
+            NoiseModel::Information(m) => NoiseModel::Information(spd(m * weight)?),
         };
         Ok(Self { model, observed: self.observed.clone() })
     }
@@ -237,9 +237,9 @@ impl Noise {
             false => Err(NoiseError::Dimension { expected: rows, found, names: &[] }),
         };
         match &self.model {
-            Model::Diagonal(s) => check(s.len())?,
-            Model::Covariance(m) | Model::Information(m) => check(m.nrows())?,
-            Model::Unit | Model::Isotropic(_) => {}
+            NoiseModel::Diagonal(s) => check(s.len())?,
+            NoiseModel::Covariance(m) | NoiseModel::Information(m) => check(m.nrows())?,
+            NoiseModel::Unit | NoiseModel::Isotropic(_) => {}
         }
         let Some(observed) = self.observed.as_deref().filter(|o| o.iter().any(|o| !o)) else {
             if let Some(o) = &self.observed {
@@ -260,7 +260,7 @@ impl Noise {
     /// # Errors
     /// As [`Noise::whitener`].
     pub fn information_matrix(&self, rows: usize) -> Result<DMatrix<f64>, NoiseError> {
-        if let (Model::Information(m), None) = (&self.model, &self.observed)
+        if let (NoiseModel::Information(m), None) = (&self.model, &self.observed)
             && m.nrows() == rows
         {
             return Ok(m.clone());
@@ -270,27 +270,31 @@ impl Noise {
     }
 }
 
-impl From<Model> for Noise {
-    fn from(model: Model) -> Self {
+impl From<NoiseModel> for Noise {
+    fn from(model: NoiseModel) -> Self {
         Noise { model, observed: None }
     }
 }
 
-impl Model {
+impl NoiseModel {
     fn whitener(&self, observed: Option<&[bool]>) -> Result<Whitener, NoiseError> {
         let mask = |s: f64, i: usize| if observed.is_none_or(|o| o[i]) { 1.0 / s } else { 0.0 };
         Ok(match (self, observed) {
-            (Model::Unit, None) => Whitener::Unit,
-            (Model::Unit, Some(o)) => Whitener::Diagonal((0..o.len()).map(|i| mask(1.0, i)).collect()),
-            (Model::Isotropic(s), None) => Whitener::Isotropic(1.0 / s),
-            (Model::Isotropic(s), Some(o)) => Whitener::Diagonal((0..o.len()).map(|i| mask(*s, i)).collect()),
-            (Model::Diagonal(s), _) => {
+            (NoiseModel::Unit, None) => Whitener::Unit,
+            (NoiseModel::Unit, Some(o)) => Whitener::Diagonal((0..o.len()).map(|i| mask(1.0, i)).collect()),
+            (NoiseModel::Isotropic(s), None) => Whitener::Isotropic(1.0 / s),
+            (NoiseModel::Isotropic(s), Some(o)) => {
+                Whitener::Diagonal((0..o.len()).map(|i| mask(*s, i)).collect())
+            }
+            (NoiseModel::Diagonal(s), _) => {
                 Whitener::Diagonal(s.iter().enumerate().map(|(i, s)| mask(*s, i)).collect())
             }
-            (Model::Information(m), None) => Whitener::Full(root(m)?),
-            (Model::Covariance(m), None) => Whitener::Full(inverse_root(m)?),
-            (Model::Information(m), Some(o)) => Whitener::Full(marginal_root(&cholesky(m)?.inverse(), o)?),
-            (Model::Covariance(m), Some(o)) => Whitener::Full(marginal_root(m, o)?),
+            (NoiseModel::Information(m), None) => Whitener::Full(root(m)?),
+            (NoiseModel::Covariance(m), None) => Whitener::Full(inverse_root(m)?),
+            (NoiseModel::Information(m), Some(o)) => {
+                Whitener::Full(marginal_root(&cholesky(m)?.inverse(), o)?)
+            }
+            (NoiseModel::Covariance(m), Some(o)) => Whitener::Full(marginal_root(m, o)?),
         })
     }
 }
@@ -349,9 +353,9 @@ fn marginal_root(covariance: &DMatrix<f64>, observed: &[bool]) -> Result<DMatrix
     Ok(w)
 }
 
-impl TryFrom<Spec> for Noise {
+impl TryFrom<NoiseDocument> for Noise {
     type Error = NoiseError;
-    fn try_from(spec: Spec) -> Result<Self, NoiseError> {
+    fn try_from(spec: NoiseDocument) -> Result<Self, NoiseError> {
         let given: Vec<&str> = [
             ("sigma", spec.sigma.is_some()),
             ("sigmas", spec.sigmas.is_some()),
@@ -375,16 +379,16 @@ impl TryFrom<Spec> for Noise {
     }
 }
 
-impl From<Noise> for Spec {
-    fn from(noise: Noise) -> Spec {
+impl From<Noise> for NoiseDocument {
+    fn from(noise: Noise) -> NoiseDocument {
         let rows = |m: DMatrix<f64>| m.row_iter().map(|r| r.iter().copied().collect()).collect();
-        let mut spec = Spec { observed: noise.observed, ..Spec::default() };
+        let mut spec = NoiseDocument { observed: noise.observed, ..NoiseDocument::default() };
         match noise.model {
-            Model::Unit => {}
-            Model::Isotropic(s) => spec.sigma = Some(s),
-            Model::Diagonal(s) => spec.sigmas = Some(s),
-            Model::Covariance(m) => spec.covariance = Some(rows(m)),
-            Model::Information(m) => spec.information = Some(rows(m)),
+            NoiseModel::Unit => {}
+            NoiseModel::Isotropic(s) => spec.sigma = Some(s),
+            NoiseModel::Diagonal(s) => spec.sigmas = Some(s),
+            NoiseModel::Covariance(m) => spec.covariance = Some(rows(m)),
+            NoiseModel::Information(m) => spec.information = Some(rows(m)),
         }
         spec
     }

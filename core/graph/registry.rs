@@ -2,3 +2,6 @@
 pub mod catalogue;
 pub mod checked;
 mod registered;
+mod type_name;
+
+pub use type_name::{TypeName, UnknownType};

@@ -69,7 +69,7 @@ pub(crate) struct Affected(pub Vec<u32>);
 
 /// New fronts that replace the affected ones.
 #[derive(Debug, Default)]
-pub(crate) struct Redone {
+pub(crate) struct RebuiltFronts {
     /// New fronts, children before parents.
     pub new: Vec<u32>,
     /// Untouched fronts with their new parents.
@@ -117,14 +117,14 @@ impl Tree {
     ///
     /// `entering` are variables that were not in the tree. `leaves` selects variables that drop out of the
     /// tree, and `is_last` those to eliminate last.
-    pub(crate) fn redo(
+    pub(crate) fn rebuild(
         &mut self,
         affected: &Affected,
         entering: &[u32],
         leaves: impl Fn(u32) -> bool,
         is_last: impl Fn(u32) -> bool,
         graph: &impl Couplings,
-    ) -> Redone {
+    ) -> RebuiltFronts {
         let mut variables = entering.to_vec();
         let mut kept = vec![];
         for f in &affected.0 {
@@ -146,7 +146,7 @@ impl Tree {
         let groups = self.order.groups();
         let new = self.fronts_of(groups, &variables, &mut kept, graph);
         variables.iter().for_each(|v| self.local[*v as usize] = NONE);
-        Redone { new, kept }
+        RebuiltFronts { new, kept }
     }
 
     /// Merges groups into fronts and stores these in unused slots.
@@ -220,7 +220,7 @@ impl Tree {
     }
 
     /// Replaces the affected fronts by the new ones.
-    pub(crate) fn swap(&mut self, affected: &Affected, redone: &Redone) {
+    pub(crate) fn swap(&mut self, affected: &Affected, rebuilt: &RebuiltFronts) {
         for f in &affected.0 {
             self.marked[*f as usize] = false;
             self.unused.push(*f);
@@ -230,15 +230,15 @@ impl Tree {
                 self.front_of[*b as usize] = NONE;
             }
         }
-        for f in &redone.new {
+        for f in &rebuilt.new {
             self.fronts[*f as usize].blocks.iter().for_each(|b| self.front_of[*b as usize] = *f);
         }
-        redone.kept.iter().for_each(|(kept, parent)| self.fronts[*kept as usize].parent = *parent);
+        rebuilt.kept.iter().for_each(|(kept, parent)| self.fronts[*kept as usize].parent = *parent);
     }
 
     /// Drops the new fronts and keeps the affected ones.
-    pub(crate) fn drop_new(&mut self, affected: &Affected, redone: &Redone) {
-        self.unused.extend(redone.new.iter().rev());
+    pub(crate) fn drop_new(&mut self, affected: &Affected, rebuilt: &RebuiltFronts) {
+        self.unused.extend(rebuilt.new.iter().rev());
         affected.0.iter().for_each(|f| self.marked[*f as usize] = false);
     }
 }

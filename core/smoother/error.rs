@@ -8,7 +8,7 @@ use manifactor_graph::{GraphError, Key};
 pub enum ChangeError {
     /// Factors and values contradict each other or the smoother. The list has all errors; factors count from
     /// 0 in the list that was pushed.
-    #[error("the factors do not fit the session:{}", GraphError::list(.0))]
+    #[error("the factors do not fit the smoother:{}", GraphError::list(.0))]
     Graph(Vec<GraphError>),
     /// A new variable whose key already exists.
     #[error("there is a variable `{key}` already; push factors on it without a value, or choose another key")]
@@ -23,29 +23,27 @@ pub enum ChangeError {
         key: Key,
     },
     /// A marginalized variable. Its factors are part of a linear prior, and no factor can be added to that.
-    #[error(
-        "`{key}` has left the session; a factor to it, or another variable of that name, is not possible any more"
-    )]
-    Gone {
+    #[error("`{key}` was marginalized: it cannot get new factors, and its key cannot be used again")]
+    Marginalized {
         /// The key of the call.
         key: Key,
     },
     /// A factor whose variables were marginalized.
-    #[error("factor {factor} has left the session with its variables: it is part of a linear prior")]
-    GoneFactor {
+    #[error("factor {factor} was marginalized with its variables: it is part of a linear prior")]
+    MarginalizedFactor {
         /// The id of the call.
         factor: FactorId,
     },
     /// A variable that has to keep its linearization point because it is part of a linear prior.
     #[error(
-        "`{key}` cannot be held or freed: it is tied to variables that have left, and keeps its linearization point"
+        "`{key}` cannot be held or freed: it is part of a linear prior, and keeps its linearization point"
     )]
-    Sealed {
+    FixedLinearization {
         /// Its key.
         key: Key,
     },
     /// A factor that never existed here or was removed.
-    #[error("there is no factor {factor}: it was removed, or is of another session")]
+    #[error("there is no factor {factor}: it was removed, or belongs to another smoother")]
     NoFactor {
         /// The id of the call.
         factor: FactorId,
@@ -68,7 +66,7 @@ pub enum ChangeError {
     },
     /// A window in seconds although no time was ever set.
     #[error(
-        "the window is by seconds, and the session does not know the time; call `set_time` before the first `push`, or use \
+        "the window is by seconds, and the smoother does not know the time; call `set_time` before the first `push`, or use \
          `window.poses`"
     )]
     NoTime,

@@ -27,7 +27,7 @@ struct Numbers {
     /// The lower triangle of a square of `below + 1` columns.
     update: Vec<f64>,
     /// Directions that no factor constrains within f64 precision, after all earlier variables are eliminated.
-    open: Vec<Scalar>,
+    undetermined: Vec<Scalar>,
 }
 
 /// The values of all fronts of a tree.
@@ -45,7 +45,7 @@ pub(crate) struct Fronts {
 }
 
 /// Front width that sizes the scratch memory of the dense kernels. Wider fronts need no more.
-const WIDEST: usize = 1 << 10;
+const SCRATCH_WIDTH: usize = 1 << 10;
 
 impl Default for Fronts {
     fn default() -> Self {
@@ -56,7 +56,7 @@ impl Default for Fronts {
             stamp: 0,
             runs: vec![],
             x: vec![],
-            scratch: Scratch::new(WIDEST),
+            scratch: Scratch::new(SCRATCH_WIDTH),
             arch: Arch::new(),
         }
     }
@@ -90,14 +90,14 @@ impl Fronts {
     fn release(&mut self, fronts: &[u32]) {
         for f in fronts {
             let Numbers { panel, update, .. } = std::mem::take(&mut self.numbers[*f as usize]);
-            self.pool.give(panel);
-            self.pool.give(update);
+            self.pool.release(panel);
+            self.pool.release(update);
         }
     }
 
     /// Returns the directions of a front's variables that no factor constrains.
-    pub(crate) fn open(&self, front: u32) -> &[Scalar] {
-        &self.numbers[front as usize].open
+    pub(crate) fn undetermined_directions(&self, front: u32) -> &[Scalar] {
+        &self.numbers[front as usize].undetermined
     }
 
     /// Computes the steps of a front's variables, concatenated, from the steps of its rows. `delta` holds the

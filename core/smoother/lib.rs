@@ -1,21 +1,21 @@
 //! An incremental smoother: a factor graph that grows while it is solved.
 //!
-//! A [`Session`] accepts new variables and factors, removes factors, and keeps the estimate up to date. Each
-//! [`update`](Session::update) recomputes only the part of the factorization that has changed, and
-//! relinearizes only variables that have moved. [`finish`](Session::finish) solves the whole graph as one
+//! A [`Smoother`] accepts new variables and factors, removes factors, and keeps the estimate up to date. Each
+//! [`update`](Smoother::update) recomputes only the part of the factorization that has changed, and
+//! relinearizes only variables that have moved. [`finish`](Smoother::finish) solves the whole graph as one
 //! batch.
 //!
 //! ```
-//! # use manifactor_smoother::{Session, Settings};
+//! # use manifactor_smoother::{Smoother, SmootherSettings};
 //! # use manifactor_graph::{Graph, Values};
 //! # fn example(frames: Vec<(Graph, Values)>) -> Result<(), Box<dyn std::error::Error>> {
-//! let mut session = Session::new(Settings::default());
+//! let mut smoother = Smoother::new(SmootherSettings::default());
 //! for (factors, values) in frames {
-//!     session.push(&factors, &values)?;
-//!     let report = session.update()?;
-//!     println!("{} variables redone", report.redone);
+//!     smoother.push(&factors, &values)?;
+//!     let report = smoother.update()?;
+//!     println!("{} variables refactorized", report.refactorized);
 //! }
-//! let pose = session.estimate("x7");
+//! let pose = smoother.estimate("x7");
 //! # Ok(())
 //! # }
 //! ```
@@ -23,16 +23,16 @@ mod elimination_tree;
 mod error;
 mod factor_id;
 mod fronts;
-mod gone;
 mod model;
+mod removed;
 mod report;
 mod saved;
-mod session;
 mod settings;
+mod smoother;
 
 pub use error::{ChangeError, UpdateError};
 pub use factor_id::FactorId;
-pub use report::{Rejection, Report, Shared};
+pub use report::{Rejection, SharedList, UpdateReport};
 pub use saved::{LoadError, SaveError};
-pub use session::{CovarianceError, Finished, Session};
-pub use settings::{ManifoldType, NotOneSpan, Outliers, Settings, Span, UnknownManifold, Window};
+pub use settings::{NotOneSpan, Outliers, SmootherSettings, Span, Window};
+pub use smoother::{Finished, Smoother, SmootherCovarianceError};

@@ -3,16 +3,16 @@ mod blocks;
 mod counting;
 mod evaluation;
 mod factors;
-mod parked;
+mod marginal_prior;
 mod regions;
-mod sealing;
+mod undetermined;
 mod variables;
 
 use crate::elimination_tree::Couplings;
-use crate::gone::Removed;
-use crate::report::Shared;
+use crate::removed::Removed;
+use crate::report::SharedList;
 pub(crate) use blocks::Blocks;
-pub(crate) use sealing::Prior;
+pub(crate) use marginal_prior::Prior;
 pub(crate) use variables::{NewNumber, Reserved};
 
 use factors::Factors;
@@ -20,11 +20,11 @@ use manifactor_graph::batch::{Batches, Member};
 use manifactor_graph::column::{Columns, FIXED};
 use manifactor_graph::normal_equations::Slot;
 use manifactor_graph::{FactorEntry, Key, Resolved, Variable, VariableIndices};
-use parked::Parked;
 use regions::{Region, Regions};
 use smallvec::SmallVec;
 use std::any::TypeId;
 use std::collections::{BTreeSet, HashMap};
+use undetermined::UndeterminedVariables;
 
 /// A sum that is not finite although its terms are. The number is a variable in the sum.
 #[derive(Debug)]
@@ -32,13 +32,13 @@ pub(crate) struct Overflow(pub u32);
 
 /// A variable of the smoother.
 #[derive(Debug, Clone)]
-pub(crate) struct Place {
+pub(crate) struct VariableRecord {
     pub key: Key,
-    /// Rank in the order of insertion, among all variables (`born`) and within its type (`ordinal`).
-    /// `is_there` is false after removal.
-    pub born: u64,
+    /// Rank in the order of insertion, among all variables (`rank`) and within its type (`ordinal`).
+    /// `is_present` is false after removal.
+    pub rank: u64,
     pub ordinal: u64,
-    pub is_there: bool,
+    pub is_present: bool,
     /// Column of its type, and index in that column.
     pub column: u32,
     pub index: u32,
@@ -46,10 +46,10 @@ pub(crate) struct Place {
     /// One bit per held direction.
     pub held: u32,
     /// Number of linear priors that contain it. If there are any, it keeps its linearization point.
-    pub sealed: u32,
+    pub prior_count: u32,
 }
 
-impl Place {
+impl VariableRecord {
     /// Returns whether all directions are held.
     pub(crate) fn is_held(&self) -> bool {
         self.held.count_ones() as usize == self.tangent.len()
@@ -107,11 +107,12 @@ impl Factor {
 /// All variables and factors, with insertion and removal.
 #[derive(Default)]
 pub(crate) struct Model {
-    places: Vec<Place>,
+    records: Vec<VariableRecord>,
     numbers: HashMap<Key, u32, foldhash::fast::RandomState>,
     /// Numbers of removed variables, by column.
     unused: Vec<Vec<u32>>,
-    born: u64,
+    /// Number of variables ever added.
+    added: u64,
     /// Number of variables ever added, by column.
     ordinals: Vec<u64>,
     /// Linearization points, and trial points at which factors are evaluated. Outside of an update both are
@@ -128,14 +129,14 @@ pub(crate) struct Model {
     robust: usize,
     /// Factors rejected as outliers. They couple no variables and are in no sum.
     rejected: BTreeSet<u32>,
-    parked: Parked,
+    undetermined: UndeterminedVariables,
     /// Variables and factors that were removed.
     pub removed: Removed,
 }
 
 impl Couplings for Model {
     fn variables(&self) -> usize {
-        self.places.len()
+        self.records.len()
     }
     fn dim(&self, variable: u32) -> usize {
         self.blocks.dim(variable)
@@ -164,29 +165,29 @@ impl Model {
     pub(crate) fn variable(&self, key: &str) -> Option<u32> {
         self.numbers.get(key).copied()
     }
-    pub(crate) fn place(&self, variable: u32) -> &Place {
-        &self.places[variable as usize]
+    pub(crate) fn record(&self, variable: u32) -> &VariableRecord {
+        &self.records[variable as usize]
     }
-    pub(crate) fn place_mut(&mut self, variable: u32) -> &mut Place {
-        &mut self.places[variable as usize]
+    pub(crate) fn record_mut(&mut self, variable: u32) -> &mut VariableRecord {
+        &mut self.records[variable as usize]
     }
-    /// Returns whether a variable is parked: outside of the tree until factors determine it.
-    pub(crate) fn is_parked(&self, variable: u32) -> bool {
-        self.parked.contains(variable)
+    /// Returns whether a variable is undetermined: outside of the tree until factors determine it.
+    pub(crate) fn is_undetermined(&self, variable: u32) -> bool {
+        self.undetermined.contains(variable)
     }
-    /// Parks or unparks a variable. Returns whether it was parked.
-    pub(crate) fn set_parked(&mut self, variable: u32, is_parked: bool) -> bool {
-        self.parked.set(variable, is_parked)
+    /// Marks a variable as undetermined or determined. Returns whether it was undetermined.
+    pub(crate) fn set_undetermined(&mut self, variable: u32, is_undetermined: bool) -> bool {
+        self.undetermined.set(variable, is_undetermined)
     }
-    /// Returns the keys of all parked variables; `None` if they are unchanged since the last call.
-    pub(crate) fn changed_parked_keys(&mut self) -> Option<Shared<Key>> {
-        let has_changed = self.parked.has_changed();
-        has_changed.then(|| self.parked.iter().map(|v| self.places[v as usize].key.clone()).collect())
+    /// Returns the keys of all undetermined variables; `None` if they are unchanged since the last call.
+    pub(crate) fn changed_undetermined_keys(&mut self) -> Option<SharedList<Key>> {
+        let has_changed = self.undetermined.has_changed();
+        has_changed.then(|| self.undetermined.iter().map(|v| self.records[v as usize].key.clone()).collect())
     }
     /// Returns whether a variable is solved for.
     pub(crate) fn is_in_tree(&self, variable: u32) -> bool {
-        let place = self.place(variable);
-        place.is_there && !self.is_parked(variable) && !place.is_held()
+        let place = self.record(variable);
+        place.is_present && !self.is_undetermined(variable) && !place.is_held()
     }
     /// Returns the number of present variables.
     pub(crate) fn present(&self) -> usize {
@@ -198,7 +199,7 @@ impl Model {
     }
     /// Returns the linearization point of a variable.
     pub(crate) fn point(&self, variable: u32) -> Option<Box<dyn Variable>> {
-        let place = self.place(variable);
+        let place = self.record(variable);
         self.points.column(place.column as usize).get(place.index as usize)
     }
 
@@ -212,7 +213,7 @@ impl Model {
             *at = scalars;
             scalars += self.blocks.dim(*v) as u32;
         }
-        let place = self.regions.take(scalars);
+        let place = self.regions.acquire(scalars);
         let region = self.regions[place];
         self.blocks.connect(number, place, &members);
         let batch = self.batches.place(entry.factor.erased(), &resolved.whitener, entry.loss.as_deref());
@@ -226,7 +227,7 @@ impl Model {
             ..Factor::prior(members, place, 0.0)
         };
         let index: SmallVec<[u32; 4]> =
-            factor.variables.iter().map(|v| self.places[*v as usize].index).collect();
+            factor.variables.iter().map(|v| self.records[*v as usize].index).collect();
         let (starts, held) = self.starts(&factor, region);
         let slots = self.slots(&factor, region);
         let to = &mut self.batches.as_mut_slice()[batch];
@@ -235,7 +236,7 @@ impl Model {
             factor: residual.factor.erased().as_any(),
             index: &index,
             starts: &starts,
-            held: &held,
+            fixed: &held,
             slots: &slots,
             whitener: &resolved.whitener,
             loss: residual.loss.as_deref(),
@@ -252,7 +253,7 @@ impl Model {
     /// directions.
     fn starts(&self, factor: &Factor, region: Region) -> (SmallVec<[u32; 4]>, SmallVec<[u32; 4]>) {
         let one = |v: &u32| {
-            let place = &self.places[*v as usize];
+            let place = &self.records[*v as usize];
             let start = if place.is_held() { FIXED } else { (region.g as u32) + factor.at(*v) };
             (start, if place.is_held() { 0 } else { place.held })
         };
@@ -279,9 +280,9 @@ impl Model {
         if !self.rejected.remove(&number) {
             self.blocks.disconnect(number, &factor.members);
         }
-        self.regions.give(factor.region);
+        self.regions.release(factor.region);
         if factor.entry.is_none() {
-            factor.members.iter().for_each(|(v, _)| self.places[*v as usize].sealed -= 1);
+            factor.members.iter().for_each(|(v, _)| self.records[*v as usize].prior_count -= 1);
             return Some(factor);
         }
         self.robust -= usize::from(factor.is_robust());
@@ -295,7 +296,7 @@ impl Model {
     }
 }
 
-impl Place {
+impl VariableRecord {
     fn in_columns(&self) -> (usize, usize) {
         (self.column as usize, self.index as usize)
     }

@@ -7,9 +7,10 @@ use std::sync::Arc;
 
 /// Report of one update.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Report {
+pub struct UpdateReport {
     /// Number of variables whose part of the factorization was recomputed.
-    pub redone: usize,
+    #[serde(rename = "redone")]
+    pub refactorized: usize,
     /// Number of variables with a new linearization point.
     pub relinearized: usize,
     /// Number of variables whose relinearization exceeds the budget. The next updates relinearize them.
@@ -29,15 +30,19 @@ pub struct Report {
     pub solved_batch: bool,
     /// Undetermined variables: their diagonal block of H is rank deficient. They and their factors take no
     /// part until more factors determine them.
-    pub parked: Shared<Key>,
+    #[serde(rename = "parked")]
+    pub undetermined_variables: SharedList<Key>,
     /// Directions that no factor constrains, such as a free gauge, by variable and name of the tangent
     /// direction. They are held at their current value.
-    pub undetermined: Vec<(Key, &'static str)>,
+    #[serde(rename = "undetermined")]
+    pub undetermined_directions: Vec<(Key, &'static str)>,
     /// Marginalized variables. A linear prior replaces their factors.
-    pub sealed: Vec<Key>,
+    #[serde(rename = "sealed")]
+    pub marginalized: Vec<Key>,
     /// Variables that could not be marginalized, because their linear prior or its sums overflow. A window
     /// tries them again with the next update. Remedy: scale the noise of their factors.
-    pub stayed: Vec<Key>,
+    #[serde(rename = "stayed")]
+    pub not_marginalized: Vec<Key>,
     /// Factors that took no part and were dropped together with marginalized variables.
     pub dropped: Vec<FactorId>,
     /// Factors that this update has rejected as outliers.
@@ -65,25 +70,25 @@ pub struct Rejection {
 /// A list that is shared between reports until it changes. It can be long, and most updates do not change it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
-pub struct Shared<T>(Arc<[T]>);
+pub struct SharedList<T>(Arc<[T]>);
 
-impl<T> Default for Shared<T> {
+impl<T> Default for SharedList<T> {
     fn default() -> Self {
         Self(Arc::from([]))
     }
 }
-impl<T> Deref for Shared<T> {
+impl<T> Deref for SharedList<T> {
     type Target = [T];
     fn deref(&self) -> &[T] {
         &self.0
     }
 }
-impl<T> FromIterator<T> for Shared<T> {
+impl<T> FromIterator<T> for SharedList<T> {
     fn from_iter<I: IntoIterator<Item = T>>(items: I) -> Self {
         Self(items.into_iter().collect())
     }
 }
-impl<'a, T> IntoIterator for &'a Shared<T> {
+impl<'a, T> IntoIterator for &'a SharedList<T> {
     type Item = &'a T;
     type IntoIter = std::slice::Iter<'a, T>;
     fn into_iter(self) -> Self::IntoIter {

@@ -8,8 +8,8 @@
 //! The document holds the state that depends on history: factors, linearization points, steps, and the
 //! variables of each front. It does not hold the values of the factorization, because equal points in an
 //! equal tree reproduce their bits.
-use crate::gone::{GoneKeys, Runs};
-use crate::settings::Settings;
+use crate::removed::{NumberRanges, RemovedKeys};
+use crate::settings::SmootherSettings;
 use manifactor_graph::{FactorEntry, GraphError, Key, Variable};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -22,7 +22,7 @@ const VERSION: u32 = 3;
 #[non_exhaustive]
 pub enum SaveError {
     /// Changes that no update has made yet.
-    #[error("there are changes that no update has made yet; update the session, and save it then")]
+    #[error("there are changes that no update has made yet; update the smoother, and save it then")]
     Pending,
     /// A value or a factor that cannot be written as text.
     #[error("cannot be saved: {0}")]
@@ -34,7 +34,7 @@ pub enum SaveError {
 #[non_exhaustive]
 pub enum LoadError {
     /// A text that is not a saved smoother.
-    #[error("no saved session: expected a first line `manifactor session {version} …`")]
+    #[error("no saved smoother: expected a first line `manifactor session {version} …`")]
     Foreign {
         /// The version that this program reads.
         version: u32,
@@ -54,10 +54,10 @@ pub enum LoadError {
     #[error("cannot read what was saved: {0}")]
     Read(String),
     /// Factors and values that contradict each other.
-    #[error("the saved session contradicts itself:{}", GraphError::list(.0))]
+    #[error("the saved smoother contradicts itself:{}", GraphError::list(.0))]
     Graph(Vec<GraphError>),
     /// Any other contradiction.
-    #[error("the saved session contradicts itself: {0}")]
+    #[error("the saved smoother contradicts itself: {0}")]
     Inconsistent(&'static str),
 }
 
@@ -65,7 +65,7 @@ pub enum LoadError {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Saved {
-    pub settings: Settings,
+    pub settings: SmootherSettings,
     pub updates: usize,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_quiet: bool,
@@ -78,14 +78,17 @@ pub(crate) struct Saved {
     /// Children before parents.
     pub fronts: Vec<SavedFront>,
     /// Number of variables ever added.
-    pub born: u64,
+    #[serde(rename = "born")]
+    pub added: u64,
     /// Number of variables ever added, by column.
     pub ordinals: Vec<u64>,
     /// Free variable numbers. The last one is reused first.
     pub unused: Vec<u32>,
     pub priors: Vec<SavedPrior>,
-    pub gone: GoneKeys,
-    pub gone_factors: Runs,
+    #[serde(rename = "gone")]
+    pub removed_keys: RemovedKeys,
+    #[serde(rename = "gone_factors")]
+    pub removed_factors: NumberRanges,
     /// Variables outside of the region of their linearization (`waiting`), far outside (`urgent`), and parked
     /// variables to check again (`doubtful`).
     pub waiting: Vec<u32>,
@@ -96,7 +99,8 @@ pub(crate) struct Saved {
     /// Bits of the insertion time of each variable in a window by seconds, the oldest first.
     pub times: Vec<u64>,
     /// Variables that have moved since the last outlier test.
-    pub shaken: BTreeSet<u32>,
+    #[serde(rename = "shaken")]
+    pub moved: BTreeSet<u32>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -105,7 +109,8 @@ pub(crate) struct SavedVariable {
     pub key: Key,
     /// Ranks in the order of insertion, among all variables and within the type; `None` for a removed
     /// variable.
-    pub born: Option<[u64; 2]>,
+    #[serde(rename = "born")]
+    pub ranks: Option<[u64; 2]>,
     /// Linearization point, and bits of the step from there.
     pub point: Box<dyn Variable>,
     pub step: Vec<u64>,
@@ -113,7 +118,8 @@ pub(crate) struct SavedVariable {
     #[serde(default, skip_serializing_if = "is_none")]
     pub damping: (u64, bool),
     pub held: u32,
-    pub parked: bool,
+    #[serde(rename = "parked")]
+    pub is_undetermined: bool,
 }
 
 fn is_none(damping: &(u64, bool)) -> bool {
@@ -127,14 +133,14 @@ pub(crate) struct SavedFactor {
     pub weight: f64,
     pub entry: FactorEntry,
     /// Present for a candidate of the outlier test.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub suspect: Option<Suspect>,
+    #[serde(rename = "suspect", default, skip_serializing_if = "Option::is_none")]
+    pub candidate: Option<SavedCandidate>,
 }
 
 /// A factor that may be an outlier.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Suspect {
+pub(crate) struct SavedCandidate {
     /// Upper limit of ‖r‖² for an inlier: the χ² quantile for its rows.
     pub(crate) bound: f64,
     /// Largest information gain without confirmation by a second factor. Unit: nats.

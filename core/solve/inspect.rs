@@ -1,6 +1,5 @@
 //! Analysis of an estimate: covariances, conditioning, undetermined directions and the factors with the
 //! largest costs.
-mod at_start;
 mod condition;
 mod covariance;
 mod diagnosis;
@@ -8,9 +7,10 @@ mod factorized;
 mod leverage;
 mod moving;
 pub(crate) mod null_space;
-mod untouched;
+mod start_diagnosis;
+mod unconstrained;
 
-pub use at_start::{AtStart, Weak};
 pub use covariance::{CovarianceError, Marginal};
 pub use diagnosis::{Diagnosis, FactorCost};
 pub use factorized::Factorized;
+pub use start_diagnosis::{StartDiagnosis, WeakDirection};

@@ -6,22 +6,27 @@
 mod inspect;
 mod linear;
 mod observer;
+pub mod odometry;
 mod outcome;
 mod problem;
 mod strategy;
 
-pub use inspect::{AtStart, CovarianceError, Diagnosis, FactorCost, Factorized, Marginal, Weak};
+pub use inspect::{
+    CovarianceError, Diagnosis, FactorCost, Factorized, Marginal, StartDiagnosis, WeakDirection,
+};
 pub use linear::memory::{Bytes, available_memory, memory_limit};
 pub use linear::settings::{ConjugateGradients, LinearSolver, Method, Ordering, Preconditioner};
 pub use linear::{BlockSystem, BlockSystemError};
-pub use observer::{All, Interrupt, Observer, Silent};
-pub use outcome::{InactiveFactor, IterationRecord, Moving, Outcome, Rejected, Times, Untouched};
+pub use observer::{AllObservers, Interrupt, Observer, Silent};
+pub use outcome::{
+    InactiveFactor, IterationRecord, LargestMoves, Outcome, RejectedFactor, Times, UnconstrainedVariables,
+};
 pub use outcome::{Stall, Termination, Tolerance, Undetermined};
-pub use problem::{ChangeError, CompileError, Problem, WeightError};
+pub use problem::{CompileError, Problem, ProblemChangeError, WeightError};
 pub use strategy::{
-    Auto, Candidates, Descent, DiagonalLimits, Dogleg, FactorType, GaussNewton, Given, Gnc, Growth,
-    LevenbergMarquardt, NotLimits, Optimizer, Probability, Start, StartError, Step, Stopping, Tried,
-    Truncation, UnknownFactor, is_sequential,
+    Auto, Candidates, Descent, DiagonalLimits, Dogleg, GaussNewton, GivenStart, Gnc, Growth,
+    LevenbergMarquardt, NotLimits, Optimizer, Probability, Start, StartError, Stopping, TrialResult,
+    TrialStep, Truncation,
 };
 
 /// The dense kernel of a front, for solvers that store their fronts themselves.
@@ -47,7 +52,7 @@ pub struct Solution {
     /// factors.
     pub weights: Vec<f64>,
     /// The solved problem, for queries about the estimate.
-    problem: problem::Kept,
+    problem: problem::SharedProblem,
 }
 
 /// Compiles and solves a graph.
@@ -72,6 +77,6 @@ impl Solution {
     /// Takes estimate, factors and weights from a problem at the end of a solve.
     fn of(problem: Problem, outcome: Outcome) -> Self {
         let (values, factors, weights) = (problem.values(), problem.inspect(), problem.weights().to_vec());
-        Self { values, outcome, factors, weights, problem: problem::Kept::new(problem) }
+        Self { values, outcome, factors, weights, problem: problem::SharedProblem::new(problem) }
     }
 }

@@ -47,9 +47,9 @@ impl<F: FnMut(&IterationRecord) -> ControlFlow<()>> Observer for F {
 }
 
 /// Several observers, called in order; each receives each record.
-pub struct All<'a>(pub Vec<&'a mut dyn Observer>);
+pub struct AllObservers<'a>(pub Vec<&'a mut dyn Observer>);
 
-impl Observer for All<'_> {
+impl Observer for AllObservers<'_> {
     fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()> {
         let mut flow = ControlFlow::Continue(());
         for observer in &mut self.0 {
@@ -77,7 +77,7 @@ impl Observer for Quiet<'_> {
     }
 }
 
-impl std::fmt::Debug for All<'_> {
+impl std::fmt::Debug for AllObservers<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} observers", self.0.len())
     }

@@ -1,15 +1,15 @@
 //! The outcome of a solve.
 mod moving;
 mod termination;
-mod untouched;
+mod unconstrained;
 
 use manifactor_graph::Key;
 use serde::Serialize;
 use std::borrow::Cow;
 
-pub use moving::Moving;
+pub use moving::LargestMoves;
 pub use termination::{Stall, Termination, Tolerance, Undetermined};
-pub use untouched::{InactiveFactor, Untouched};
+pub use unconstrained::{InactiveFactor, UnconstrainedVariables};
 
 /// Termination, costs, diagnosis and history of a solve.
 #[derive(Debug, Clone, Serialize)]
@@ -27,10 +27,10 @@ pub struct Outcome {
     pub undetermined: Option<Undetermined>,
     /// The variables that the last step moved most, if the solve ran out of iterations.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub moving: Option<Moving>,
+    pub moving: Option<LargestMoves>,
     /// Free variables without an active factor. A solve with such variables is never converged.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub untouched: Option<Untouched>,
+    #[serde(rename = "untouched", skip_serializing_if = "Option::is_none")]
+    pub unconstrained: Option<UnconstrainedVariables>,
     /// Number of factors in the problem.
     pub factors: usize,
     /// Number of factors that are undefined at the final values, and excluded from the cost.
@@ -40,7 +40,7 @@ pub struct Outcome {
     pub inactive_factors: Vec<InactiveFactor>,
     /// Factors that the solver rejects as outliers, in the order of the graph.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub rejected: Vec<Rejected>,
+    pub rejected: Vec<RejectedFactor>,
     /// Durations of the stages.
     pub times: Times,
     /// A record for each tried step.
@@ -66,7 +66,7 @@ impl Outcome {
 
 /// A factor whose cost exceeds the inlier bound.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Rejected {
+pub struct RejectedFactor {
     /// Index in the graph, from 0.
     pub factor: usize,
     /// Its name, or else the name of its type.

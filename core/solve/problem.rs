@@ -2,9 +2,9 @@
 mod change;
 mod compile;
 mod estimate;
-mod kept;
 mod method;
 mod model;
+mod shared;
 
 use crate::linear::NotPositiveDefinite;
 use crate::linear::settings::LinearSolver;
@@ -14,11 +14,11 @@ use manifactor_graph::batch::{Evaluation, FactorRows, FactorState};
 use manifactor_graph::{Graph, Values, Version};
 use std::time::Instant;
 
-pub use change::ChangeError;
+pub use change::ProblemChangeError;
 pub use compile::CompileError;
 pub use estimate::WeightError;
-pub(crate) use kept::Kept;
-pub(crate) use model::{FactorPlace, Model};
+pub(crate) use model::{Model, ProblemFactor};
+pub(crate) use shared::SharedProblem;
 
 /// A compiled graph. The structure lives as long as the problem, and all its solves reuse it.
 pub struct Problem {
@@ -92,9 +92,9 @@ impl Problem {
 
     /// Linearizes, but keeps the last separate Cholesky factor, which belongs to the previous H.
     pub(crate) fn linearize_keeping_factor(&mut self) -> Evaluation {
-        let direct = self.system.take_direct();
+        let direct = self.system.detach_direct();
         let evaluation = self.linearize();
-        self.system.put_direct(direct);
+        self.system.restore_direct(direct);
         evaluation
     }
 

@@ -9,10 +9,10 @@ mod optimizer;
 mod start;
 
 pub use auto::Auto;
-pub use descent::{Descent, Step, Tried};
+pub use descent::{Descent, TrialResult, TrialStep};
 pub use dogleg::Dogleg;
 pub use gauss_newton::GaussNewton;
-pub use gnc::{Candidates, FactorType, Gnc, Growth, Probability, Truncation, UnknownFactor, is_sequential};
+pub use gnc::{Candidates, Gnc, Growth, Probability, Truncation};
 pub use levenberg_marquardt::{DiagonalLimits, LevenbergMarquardt, NotLimits};
 pub use optimizer::{Optimizer, Stopping};
-pub use start::{Given, Start, StartError};
+pub use start::{GivenStart, Start, StartError};

@@ -18,9 +18,9 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use report::Gathered;
 
 /// Number of Jacobians for the rank.
-const FOR_RANK: usize = 32;
+const RANK_JACOBIANS: usize = 32;
 /// Largest number of attempts to simplify a point with a broken law.
-const SIMPLER: usize = 512;
+const MAX_SIMPLIFICATIONS: usize = 512;
 
 /// Settings of a factor check.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,7 +51,7 @@ impl FactorCheck {
         let mut gathered = Gathered::new(subject, self.seed);
         let stated = invariances(subject.factor.erased().as_any().type_id());
         let mut at_start = Drawn { variables: subject.around.clone(), singular: false };
-        if let Some(broken) = self.look(subject, &stated, &at_start, 0, &mut gathered) {
+        if let Some(broken) = self.check_point(subject, &stated, &at_start, 0, &mut gathered) {
             return gathered.broken(subject, &broken, &at_start);
         }
         let mut runner = TestRunner::new_with_rng(Config::default(), self.rng(0));
@@ -60,17 +60,17 @@ impl FactorCheck {
             // nothing is filtered, so no case is rejected
             let Ok(mut tree) = points.new_tree(&mut runner) else { continue };
             let drawn = tree.current();
-            if let Some(mut broken) = self.look(subject, &stated, &drawn, round, &mut gathered) {
+            if let Some(mut broken) = self.check_point(subject, &stated, &drawn, round, &mut gathered) {
                 at_start = drawn;
                 let mut failing = true;
-                for _ in 0..SIMPLER {
+                for _ in 0..MAX_SIMPLIFICATIONS {
                     let moved = if failing { tree.simplify() } else { tree.complicate() };
                     if !moved {
                         break;
                     }
                     let simpler = tree.current();
                     let mut aside = Gathered::new(subject, 0);
-                    let still = self.look(subject, &stated, &simpler, round, &mut aside);
+                    let still = self.check_point(subject, &stated, &simpler, round, &mut aside);
                     failing = still.is_some();
                     if let Some(still) = still {
                         (broken, at_start) = (still, simpler);
@@ -83,7 +83,7 @@ impl FactorCheck {
     }
 
     /// Checks one point. Returns the broken law, if any.
-    fn look(
+    fn check_point(
         &self,
         subject: &Subject,
         stated: &[&'static Invariance],
@@ -128,7 +128,7 @@ impl FactorCheck {
         gathered.entry(subject, examined.worst, drawn);
         let smooth = examined.kinks.is_empty() && !drawn.singular;
         gathered.kinks(subject, &examined.kinks, drawn);
-        if smooth && gathered.linearizations.len() < FOR_RANK {
+        if smooth && gathered.linearizations.len() < RANK_JACOBIANS {
             gathered.linearizations.push(examined.linearization);
             gathered.freedom = freedom(&gathered.linearizations);
         }

@@ -3,7 +3,7 @@ use manifactor_graph::Linearization;
 use nalgebra::DMatrix;
 
 /// A direction with a singular value below this share of the largest one is free.
-const UNSEEN: f64 = 1e-9;
+const FREE_SINGULAR_VALUE: f64 = 1e-9;
 
 /// The rank of a Jacobian over all variables, and the structure of its null space.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,7 +83,7 @@ fn null_space(linearization: &Linearization) -> Option<(usize, DMatrix<f64>)> {
     let svd = j.svd(false, true);
     let v_t = svd.v_t?;
     let largest = svd.singular_values.max();
-    let seen = |i: usize| svd.singular_values[i] > UNSEEN * largest;
+    let seen = |i: usize| svd.singular_values[i] > FREE_SINGULAR_VALUE * largest;
     let rank = (0..columns).filter(|i| seen(*i)).count();
     let mut projection = DMatrix::zeros(columns, columns);
     for row in (0..columns).filter(|i| !seen(*i)).map(|i| v_t.row(i)) {

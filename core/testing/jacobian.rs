@@ -9,7 +9,7 @@ pub use kink::Kink;
 use kink::{hull, sides};
 
 /// Distance of the nearby points that describe the residual around a point, in units of the tangent.
-const NEARBY: f64 = 1e-4;
+const NEARBY_DISTANCE: f64 = 1e-4;
 
 /// Settings of the Jacobian law. Tolerances are relative to the largest entry, or to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -181,7 +181,7 @@ impl At<'_> {
         let at = |round: usize| {
             let moved = self.variables.iter().enumerate().map(|(v, x)| {
                 // any spread over directions is sufficient
-                let part = |i: usize| NEARBY * ((31 * round + 17 * i + 7 * v + 1) as f64).sin();
+                let part = |i: usize| NEARBY_DISTANCE * ((31 * round + 17 * i + 7 * v + 1) as f64).sin();
                 let delta: Vec<f64> = (0..x.erased().dim()).map(part).collect();
                 x.erased().retract(&delta)
             });

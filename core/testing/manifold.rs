@@ -8,10 +8,10 @@ use serde_json::Value;
 /// Largest distance of two points that count as equal, relative to the largest coordinate or to 1.
 const TOLERANCE: f64 = 1e-9;
 /// Longest step of the differences.
-const STEP: f64 = 1e-2;
+const LONGEST_STEP: f64 = 1e-2;
 /// Largest difference between the derivatives of `seed` and numeric ones, relative to the largest derivative
 /// or to 1.
-const SEED: f64 = 1e-6;
+const SEED_TOLERANCE: f64 = 1e-6;
 
 /// Checks the laws of a manifold at two points, and for a tangent vector `delta` at the first. `delta` has to
 /// be inside of the chart (for rotations: shorter than π).
@@ -94,13 +94,13 @@ pub fn seed_law(x: &dyn Variable) -> Result<Option<f64>, LawError> {
             delta[direction] = h;
             from.retract(&delta).map(|there| flat(&*there))
         };
-        for (row, numeric) in differentiate(size, STEP, along).into_iter().flatten().enumerate() {
+        for (row, numeric) in differentiate(size, LONGEST_STEP, along).into_iter().flatten().enumerate() {
             let apart = (seeded[row * dim + direction] - numeric.value).abs();
             let error = if apart.is_nan() { f64::INFINITY } else { apart / scale };
             largest = f64::max(largest, error);
             // close to a singularity the finite difference is inaccurate; its own error estimate says so
             let is_exact = apart > 10.0 * numeric.error || apart.is_nan();
-            if is_exact && error > SEED && broken.is_none_or(|(worst, _)| error > worst) {
+            if is_exact && error > SEED_TOLERANCE && broken.is_none_or(|(worst, _)| error > worst) {
                 broken = Some((error, direction));
             }
         }

@@ -12,9 +12,9 @@ use serde::Serialize;
 use std::fmt::{self, Display, Formatter};
 
 /// Distances of drawn points from the example, in each direction.
-const NEAR: f64 = 1.0;
-const FAR: f64 = 10.0;
-const TINY: f64 = 1e-6;
+const NEAR_DISTANCE: f64 = 1.0;
+const FAR_DISTANCE: f64 = 10.0;
+const TINY_DISTANCE: f64 = 1e-6;
 
 /// Settings of a manifold check.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +69,7 @@ impl ManifoldCheck {
         bytes[..8].copy_from_slice(&self.seed.to_le_bytes());
         let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &bytes);
         let mut runner = TestRunner::new_with_rng(Config::default(), rng);
-        let cases = (any_of(&*origin), any_of(&*origin), steps(dim, NEAR));
+        let cases = (any_of(&*origin), any_of(&*origin), steps(dim, NEAR_DISTANCE));
         let mut report = ManifoldReport {
             manifold: entry.name,
             seed: self.seed,
@@ -102,7 +102,7 @@ fn any_of(origin: &dyn Variable) -> BoxedStrategy<Box<dyn Variable>> {
         let moved = move |delta: Vec<f64>| origin.erased().retract(&delta).unwrap_or_else(|| origin.clone());
         steps(dim, reach).prop_map(moved).boxed()
     };
-    let mut sources = vec![(8, around(NEAR)), (2, around(FAR)), (1, around(TINY))];
+    let mut sources = vec![(8, around(NEAR_DISTANCE)), (2, around(FAR_DISTANCE)), (1, around(TINY_DISTANCE))];
     if let Some(points) = points_of(origin.erased().type_id()) {
         sources.push((8, (points.anywhere)()));
         sources.extend((points.singular)().into_iter().map(|point| (1, Just(point).boxed())));

@@ -19,7 +19,7 @@ use std::num::NonZero;
 /// document is invalid; 3 a file is missing, or a file or standard output could not be read or written; 130
 /// interrupted (the best values so far are written).
 #[derive(Debug, Parser)]
-#[command(name = "manifactor", version, max_term_width = 100)]
+#[command(name = "manifactor", version, max_term_width = 80, after_help = EXAMPLES)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -31,6 +31,12 @@ pub struct Cli {
     #[arg(long, short, global = true, action = ArgAction::Count)]
     verbose: u8,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  manifactor run examples/desk/desk.toml --out out/desk
+  manifactor solve examples/03_relations/graph.toml
+  manifactor help solve";
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -81,7 +87,7 @@ impl Cli {
             Command::CheckFactor(command) => command.run(),
             Command::CheckManifold(command) => command.run(),
             Command::List(command) => command.run(),
-            Command::Explain(command) => command.run(),
+            Command::Explain(command) => command.run(&Self::command()),
             Command::Graph(command) => command.run(),
             Command::New(command) => command.run(),
             Command::Evaluate(command) => command.run(),
@@ -108,7 +114,7 @@ impl Cli {
     fn threads(&self) -> Result<usize, Failure> {
         let asked = match self.threads {
             Some(threads) => Some(threads.into()),
-            None => asked_of_rayon(std::env::var("RAYON_NUM_THREADS").ok().as_deref())?,
+            None => rayon_threads(std::env::var("RAYON_NUM_THREADS").ok().as_deref())?,
         };
         // rayon's own default reads further environment variables and accepts any number
         Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, NonZero::get)))
@@ -143,7 +149,7 @@ impl Cli {
 const MOST_THREADS: u16 = 1024;
 
 /// Number of threads from RAYON_NUM_THREADS. As in rayon, 0 and text that is not a number count as unset.
-fn asked_of_rayon(variable: Option<&str>) -> Result<Option<usize>, Failure> {
+fn rayon_threads(variable: Option<&str>) -> Result<Option<usize>, Failure> {
     let Some(text) = variable.map(str::trim).filter(|text| !text.is_empty()) else { return Ok(None) };
     let whole = text.bytes().all(|digit| digit.is_ascii_digit());
     match text.parse::<u16>() {
@@ -151,7 +157,7 @@ fn asked_of_rayon(variable: Option<&str>) -> Result<Option<usize>, Failure> {
         Ok(threads) if threads <= MOST_THREADS => Ok(Some(threads.into())),
         Err(_) if !whole => Ok(None),
         _ => Err(Failure::with_help(
-            format!("RAYON_NUM_THREADS is {text}: at most {MOST_THREADS} threads are started"),
+            format!("RAYON_NUM_THREADS is {text}, but at most {MOST_THREADS} threads are allowed"),
             "set it to the number of processors, or unset it",
         )),
     }
@@ -165,12 +171,12 @@ fn check_limit(limit: Option<u64>, least: u64, threads: usize) -> Result<(), Fai
     match limit {
         Some(limit) if limit < least => Err(Failure::with_help(
             format!(
-                "the limit of memory is {}, and the program alone takes {} with {}",
+                "the memory limit is {}, but the program alone needs {} with {}",
                 Bytes(limit),
                 Bytes(least),
                 count(threads, "thread")
             ),
-            "allow more (ulimit -v), or take fewer threads (--threads)",
+            "raise the limit (ulimit -v), or use fewer threads (--threads)",
         )),
         _ => Ok(()),
     }
@@ -201,11 +207,11 @@ mod tests {
     #[test]
     fn threads_without_a_bound_are_refused() {
         for nothing in [None, Some(""), Some("0"), Some("-3"), Some("many")] {
-            assert_eq!(asked_of_rayon(nothing).unwrap(), None, "{nothing:?}");
+            assert_eq!(rayon_threads(nothing).unwrap(), None, "{nothing:?}");
         }
-        assert_eq!(asked_of_rayon(Some(" 7 ")).unwrap(), Some(7));
+        assert_eq!(rayon_threads(Some(" 7 ")).unwrap(), Some(7));
         for too_many in ["1025", "99999", "99999999999999999999999"] {
-            let refused = asked_of_rayon(Some(too_many)).unwrap_err().to_string();
+            let refused = rayon_threads(Some(too_many)).unwrap_err().to_string();
             assert!(refused.contains(too_many) && refused.contains("1024"), "{refused}");
         }
     }

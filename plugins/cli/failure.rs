@@ -25,11 +25,13 @@ pub enum Failure {
         /// A remedy.
         help: Option<String>,
     },
-    /// A folder of data that does not exist: exit code 3.
+    /// A folder that does not exist, or does not have the expected files: exit code 3.
     #[error("{message}")]
     NotThere {
-        /// The folder, the places searched, and a remedy.
+        /// The error.
         message: String,
+        /// A remedy.
+        help: Option<String>,
     },
     /// A file that could not be read or written: exit code 3.
     #[error("{}: {source}", path.display())]
@@ -80,21 +82,22 @@ impl Failure {
     /// Prints the failure on stderr with its source line, and also as JSON on stdout if `as_json` is set.
     pub fn show(&self, as_json: bool) {
         if as_json {
-            output::json(&self.to_json());
+            output::print_json(&self.to_json());
         }
         for report in self.reports() {
-            output::say_styled(&report);
+            output::print_styled_message(&report);
         }
         if self.omitted() > 0 {
-            output::say(&format!("and {} more errors", self.omitted()));
+            output::print_message(&format!("and {} more errors", self.omitted()));
         }
     }
 
     fn to_json(&self) -> Value {
         let errors: Vec<Value> = match self {
             Self::Documents(list) => list.iter().map(place_as_json).collect(),
-            Self::Input { message, help } => vec![json!({ "message": message, "help": help })],
-            Self::NotThere { message } => vec![json!({ "message": message })],
+            Self::Input { message, help } | Self::NotThere { message, help } => {
+                vec![json!({ "message": message, "help": help })]
+            }
             Self::File { path, source } => {
                 vec![json!({ "message": source.to_string(), "file": path.display().to_string() })]
             }
@@ -116,8 +119,10 @@ impl Failure {
     fn reports(&self) -> Vec<String> {
         match self {
             Self::Documents(list) => list.iter().map(render).collect(),
-            Self::Input { message, help } => vec![fancy(plain(message, help.as_deref()).into())],
-            Self::NotThere { .. } | Self::File { .. } => vec![fancy(plain(&self.to_string(), None).into())],
+            Self::Input { message, help } | Self::NotThere { message, help } => {
+                vec![fancy(plain(message, help.as_deref()).into())]
+            }
+            Self::File { .. } => vec![fancy(plain(&self.to_string(), None).into())],
         }
     }
 }
@@ -132,7 +137,7 @@ impl From<SourceError> for Failure {
     fn from(error: SourceError) -> Self {
         match error {
             SourceError::Format(error) => error.into(),
-            error @ SourceError::NoFolder { .. } => Self::NotThere { message: error.to_string() },
+            SourceError::NoFolder { name, tried, no_data_folder } => no_folder(&name, &tried, no_data_folder),
             other => Self::input(other),
         }
     }
@@ -161,12 +166,13 @@ impl From<FolderError> for Failure {
     fn from(error: FolderError) -> Self {
         match error {
             FolderError::Io { path, source } => Self::File { path, source },
-            FolderError::InUse { .. } => {
-                Self::with_help(error, "wait until it has ended, or choose another folder with --out")
-            }
+            FolderError::InUse { .. } => Self::with_help(
+                error,
+                "wait until that command has ended, or choose another folder with --out",
+            ),
             other => Self::with_help(
                 other,
-                "choose another folder with --out; --force writes into this one, over files of the same names",
+                "choose another folder with --out, or write into this one with --force, which overwrites files with the same names",
             ),
         }
     }
@@ -189,6 +195,45 @@ impl From<FormatError> for Failure {
             other => Self::input(other),
         }
     }
+}
+
+/// Largest number of searched folders that are listed.
+const LISTED: usize = 3;
+
+/// The error of a data set that is in none of the folders `tried`.
+fn no_folder(name: &Path, tried: &[PathBuf], no_data_folder: bool) -> Failure {
+    let mut searched: Vec<String> =
+        tried.iter().take(LISTED).map(|path| path.display().to_string()).collect();
+    if tried.len() > LISTED {
+        searched.push(format!("and {} more", tried.len() - LISTED));
+    }
+    let help = match no_data_folder {
+        true => {
+            "give the folder of the data sets with --data DIR, or with the environment variable MANIFACTOR_DATA"
+        }
+        false => "check the name, and the folder given by --data or MANIFACTOR_DATA",
+    };
+    let message = format!("there is no folder `{}`; searched: {}", name.display(), searched.join(", "));
+    Failure::NotThere { message, help: Some(help.to_owned()) }
+}
+
+/// The remedy for a diagnostic: its own, or one that needs the text of the document.
+fn help(diagnostic: &Diagnostic) -> Option<String> {
+    let is_axis = |known: &[String]| known.iter().map(String::as_str).eq(["name", "options"]);
+    match &diagnostic.fault {
+        Fault::WrongType { expected, found } if expected == "an array" && found == "a table" => {
+            // a header of TOML
+            let line = diagnostic.place.source.text().lines().nth(diagnostic.line().saturating_sub(1))?;
+            let (name, _) = line.trim_start().strip_prefix('[')?.split_once(']')?;
+            Some(format!("write `[[{name}]]`: each entry of the array is a table"))
+        }
+        Fault::UnknownField { known, .. } if is_axis(known) => Some(
+            "an axis has `columns` and `rows`, or `name` and `options`; see `manifactor explain axes`"
+                .to_owned(),
+        ),
+        _ => None,
+    }
+    .or_else(|| diagnostic.help())
 }
 
 /// Converts the malformed lines of a file to diagnostics with their positions.
@@ -220,7 +265,7 @@ fn places(mut malformed: Malformed) -> Diagnostics {
 fn place_as_json(diagnostic: &Diagnostic) -> Value {
     json!({
         "message": diagnostic.message(),
-        "help": diagnostic.help(),
+        "help": help(diagnostic),
         "file": diagnostic.place.source.name(),
         "line": diagnostic.line(),
         "column": diagnostic.column(),
@@ -230,7 +275,7 @@ fn place_as_json(diagnostic: &Diagnostic) -> Value {
 /// Formats a warning together with its source line.
 pub(crate) fn render(diagnostic: &Diagnostic) -> String {
     let source = &diagnostic.place.source;
-    let help = diagnostic.help();
+    let help = help(diagnostic);
     let message = plain(&diagnostic.message(), help.as_deref());
     if source.text().is_empty() {
         // a file that could not be read has no line to show

@@ -4,6 +4,7 @@ pub(crate) mod choice;
 pub(crate) mod destination;
 pub(crate) mod document;
 pub(crate) mod graph_file;
+pub(crate) mod kind;
 pub(crate) mod pictures;
 pub(crate) mod run_file;
 pub(crate) mod solver;

@@ -123,7 +123,7 @@ impl Inspection {
                 format!("{:.4}", row.before.cost),
                 row.after.as_ref().map_or_else(|| "-".into(), |s| format!("{:.4}", s.cost)),
                 format!("{:.3}", last.weight),
-                if residual.is_empty() { "not defined".into() } else { residual.join(" ") },
+                if residual.is_empty() { "undefined".into() } else { residual.join(" ") },
             ]);
         }
         let after = self.cost.after.map(|c| format!(" -> {c:.6}")).unwrap_or_default();

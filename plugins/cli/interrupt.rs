@@ -12,10 +12,12 @@ pub(crate) fn on_ctrl_c() -> Interrupt {
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        output::say("interrupted: ending with what there is so far; once more to quit at once");
+        output::print_message(
+            "interrupted: writing the results so far; press Ctrl-C again to quit immediately",
+        );
     };
     if let Err(error) = ctrlc::set_handler(handler) {
-        output::say(&format!("Ctrl-C will end the program at once: {error}"));
+        output::print_message(&format!("Ctrl-C will end the program immediately, without results: {error}"));
     }
     interrupt
 }

@@ -56,11 +56,11 @@ pub fn main_with(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone
             // clap quotes arguments of any length
             let text = error.render().to_string();
             let lines: Vec<String> = text.trim_end().lines().map(output::text::shortened).collect();
-            output::say(&lines.join("\n"));
+            output::print_message(&lines.join("\n"));
             return Failure::usage();
         }
         Err(help) => {
-            output::printed(help.print().and_then(|()| std::io::stdout().flush()));
+            output::report_lost_output(help.print().and_then(|()| std::io::stdout().flush()));
             return if output::is_lost() { Failure::files() } else { Status::Done.into() };
         }
     };

@@ -1,53 +1,43 @@
 //! The config reference: every document and every linked name, as Markdown.
 //!
 //! It begins with an index by name, with links from a document to its types and back.
+pub(crate) mod documents;
 pub(crate) mod fields;
 
-use crate::input::graph_file;
+use crate::reference::documents::DOCUMENTS;
 use crate::reference::fields::{Field, fields};
 use manifactor::config::Definitions;
 use manifactor::graph::Noise;
 use manifactor::graph::catalogue::{self, Entry};
 use manifactor::graph::invariance::invariances_of;
-use manifactor::slam::schema::{experiment_root, rules_root, run_root};
 use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
 
 const HEAD: &str = "# Config reference
-Written by `manifactor list --markdown`; a test fails where it is not what is linked. `manifactor explain NAME` prints one of
-these entries, `manifactor schema` the JSON Schema of all of it.
+`manifactor list --markdown` writes this page, and a test compares the two. `manifactor explain NAME` prints one of these
+entries, and `manifactor schema` prints the JSON Schema of all of them.
 
-For completion and checks in an editor, write the schema of a kind of document to a file, `manifactor schema run > run.schema.json`
-(or `graph`, `experiment`, `rules`; without a name, of all of them), and tell the editor of it:
-- TOML, by taplo or VS Code with Even Better TOML: `#:schema ./run.schema.json` as first line of the document;
-- YAML, by the language server of Red Hat: `# yaml-language-server: $schema=./run.schema.json` as first line;
-- JSON, by VS Code: an entry under `json.schemas` in its settings.
+For completion and checks in an editor, write the schema of a kind of document to a file with
+`manifactor schema run > run.schema.json` (or `graph`, `experiment`, `rules`; without a name, one schema for all). Then name
+the file to the editor:
+- TOML, with taplo or VS Code with Even Better TOML: `#:schema ./run.schema.json` as first line of the document;
+- YAML, with the language server of Red Hat: `# yaml-language-server: $schema=./run.schema.json` as first line;
+- JSON, with VS Code: an entry under `json.schemas` in its settings.
 
-`a.b` is the field `b` of the table `a`, `a[].b` that of each table in the list `a`.
+`a.b` is the field `b` of the table `a`, and `a[].b` is the field `b` of each table in the list `a`.
 ";
-
-/// A kind of document, and the root of its schema.
-type Root = fn(&mut Definitions) -> Value;
 
 /// Returns the whole page.
 pub(crate) fn markdown() -> String {
-    let roots: [(&str, Root); 4] = [
-        ("A literal graph", graph_file::root),
-        ("A run", run_root),
-        ("A file of semantic rules", rules_root),
-        ("An experiment", experiment_root),
-    ];
     let mut out = HEAD.to_owned() + "\n## Contents\n";
-    for (title, _) in roots {
+    for document in &DOCUMENTS {
+        let title = document.title;
         out += &format!("- [{title}](#{})\n", title.to_lowercase().replace(' ', "-"));
     }
     out += &format!("- [Noise](#noise)\n{}", contents());
     out += "- [Settings that several types share](#settings-that-several-types-share)\n";
-    for (title, root) in roots {
-        let mut definitions = Definitions::new();
-        let root = root(&mut definitions);
-        out += &format!("\n## {title}\n");
-        out += &table(&fields(&definitions.document(root)));
+    for document in &DOCUMENTS {
+        out += &format!("\n## {}\n{}", document.title, table(&document.fields()));
     }
     let mut noise = Definitions::new();
     let schema = noise.of::<Noise>();
@@ -170,7 +160,7 @@ fn table(fields: &[Field]) -> String {
         format!("| `{}` | {kind} | {default} | {} |\n", field.name, cell(&field.docs))
     };
     let rows: String = fields.iter().map(row).collect();
-    format!("\n| field | type | default | what it is |\n| --- | --- | --- | --- |\n{rows}")
+    format!("\n| field | type | default | meaning |\n| --- | --- | --- | --- |\n{rows}")
 }
 
 /// A link to the section of a kind of registered types, or of noise.

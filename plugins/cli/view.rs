@@ -35,7 +35,7 @@ pub(crate) struct View {
     server: JoinHandle<()>,
     url: String,
     is_everywhere: bool,
-    is_told: bool,
+    is_announced: bool,
     /// Time of the next refresh of the whole map.
     due: Cell<Instant>,
 }
@@ -51,7 +51,8 @@ impl View {
     /// If the address cannot be opened.
     pub(crate) fn open(address: SocketAddr) -> Result<Self, Failure> {
         let failed = |error: std::io::Error| {
-            let help = "choose another with --view=ADDRESS; with port 0, or --view alone, the system chooses a free one";
+            let help =
+                "choose another address with --view=ADDRESS; port 0, or --view alone, selects a free port";
             Failure::with_help(format!("--view: cannot listen at {address}: {error}"), help)
         };
         let listener = TcpListener::bind(address).map_err(failed)?;
@@ -60,7 +61,7 @@ impl View {
         let (url, is_everywhere) = (access.url(address), address.ip().is_unspecified());
         let (map, states) = watch::channel(Arc::default());
         let server = server::begin(listener, access, states).map_err(failed)?;
-        Ok(Self { map, server, url, is_everywhere, is_told: false, due: Cell::new(Instant::now()) })
+        Ok(Self { map, server, url, is_everywhere, is_announced: false, due: Cell::new(Instant::now()) })
     }
 
     /// Changes the state. It is copied only while the server encodes it for a browser.
@@ -71,15 +72,18 @@ impl View {
     /// Begins a variant of the run `title`. The first call prints the address.
     pub(crate) fn begin(&mut self, title: &str, variant: &str, as_json: bool) {
         self.change(|map| *map = LiveMap::new(title, variant));
-        if std::mem::replace(&mut self.is_told, true) {
+        if std::mem::replace(&mut self.is_announced, true) {
             return;
         }
         if as_json {
-            output::json_line(&json!({ "view": self.url }));
+            output::print_json_line(&json!({ "view": self.url }));
         }
-        let elsewhere =
-            if self.is_everywhere { " (from elsewhere: with the name of this machine)" } else { "" };
-        output::say(&format!("the map as it grows: {}{elsewhere}", self.url));
+        let elsewhere = if self.is_everywhere {
+            " (on another machine, replace the host by the name of this machine)"
+        } else {
+            ""
+        };
+        output::print_message(&format!("live map: {}{elsewhere}", self.url));
     }
 
     /// Shows the result of a frame.
@@ -105,7 +109,7 @@ impl View {
     }
 
     /// Shows the map estimated from all frames.
-    pub(crate) fn settle(&self, estimate: &Estimate) {
+    pub(crate) fn show_estimate(&self, estimate: &Estimate) {
         self.change(|map| map.settle(estimate));
     }
 
@@ -119,9 +123,9 @@ impl View {
 }
 
 /// Shows the solve of all frames as one batch.
-pub(crate) struct Solve<'a>(pub(crate) Option<&'a View>);
+pub(crate) struct SolveDisplay<'a>(pub(crate) Option<&'a View>);
 
-impl Observer for Solve<'_> {
+impl Observer for SolveDisplay<'_> {
     fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()> {
         if let Some(view) = self.0 {
             let phase = Phase::Solving { iteration: record.iteration };

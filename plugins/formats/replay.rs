@@ -7,6 +7,7 @@
 //! reachable: parts of the graph that are not connected to the rest.
 use manifactor_geometry::{Tree, spanning_tree};
 use manifactor_graph::{FactorEntry, Graph, Key, ValueError, Values, Variable};
+use manifactor_solve::odometry::{best_fit, by_variables};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 
@@ -36,18 +37,13 @@ pub struct ReplayStep {
 /// Sorts factors between the same variables: the one with the best fit to the initial values comes first, as
 /// the remaining ones may be false loop closures.
 fn best_first(factors: &mut [FactorEntry], initial: &Values) {
-    let misfit = |entry: &FactorEntry| {
-        let point = |key: &Key| Some(initial.variable(key.as_str())?.erased().clone_box());
-        entry.squared(point).unwrap_or(f64::INFINITY)
-    };
-    let mut first: HashMap<Vec<Key>, usize> = HashMap::new();
-    for i in 0..factors.len() {
-        let Some(entry) = factors.get(i).filter(|entry| entry.keys.len() > 1) else { continue };
-        let mut keys = entry.keys.clone();
-        keys.sort_unstable();
-        let before = *first.entry(keys).or_insert(i);
-        if before != i && factors.get(before).is_some_and(|other| misfit(entry) < misfit(other)) {
-            factors.swap(before, i);
+    let point = |key: &Key| Some(initial.variable(key.as_str())?.erased().clone_box());
+    let all = factors.iter().enumerate().map(|(i, entry)| (entry.keys.clone(), i));
+    for parallel in by_variables(all).into_values().filter(|parallel| parallel.len() > 1) {
+        let misfit =
+            |i: &usize| factors.get(*i).and_then(|entry| entry.squared(point)).unwrap_or(f64::INFINITY);
+        if let (Some(first), Some(best)) = (parallel.first(), best_fit(parallel.iter().copied(), misfit)) {
+            factors.swap(*first, best);
         }
     }
 }

@@ -15,7 +15,7 @@ mod input;
 mod log;
 mod raised;
 mod runs;
-mod session;
+mod smoother;
 mod solution;
 mod threads;
 
@@ -30,8 +30,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<graph::Graph>()?;
     module.add_class::<graph::Values>()?;
     module.add_class::<solution::Solution>()?;
-    module.add_class::<session::Session>()?;
-    module.add_class::<session::FactorId>()?;
+    module.add_class::<smoother::Smoother>()?;
+    module.add_class::<smoother::FactorId>()?;
     catalogue::register(module)?;
     chosen::register(module)?;
     graph::register(module)?;

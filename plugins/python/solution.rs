@@ -9,7 +9,7 @@ use crate::threads::detach;
 use account::{Account, State, parsed, restored};
 use manifactor::graph::{Graph as InnerGraph, Key, Values as InnerValues};
 use manifactor::solve::{
-    Auto, Given, IterationRecord, Observer, Optimizer, Solution as Inner, Start, solve as solve_inner,
+    Auto, GivenStart, IterationRecord, Observer, Optimizer, Solution as Inner, Start, solve as solve_inner,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
@@ -95,7 +95,7 @@ fn solve(
     let solver: Arc<dyn Optimizer> =
         solver.map_or_else(|| Ok(Arc::new(Auto::default()) as _), |s| self::solver("solver", s))?;
     let start: Arc<dyn Start> =
-        start.map_or_else(|| Ok(Arc::new(Given::default()) as _), |s| self::start("start", s))?;
+        start.map_or_else(|| Ok(Arc::new(GivenStart::default()) as _), |s| self::start("start", s))?;
     let mut watch = Watch::new(observer);
     let (graph, values) = (graph.0.snapshot(), values.0.snapshot());
     let solved = detach(py, || {

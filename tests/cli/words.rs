@@ -1,5 +1,7 @@
 //! Printed text: examples of the book, messages, logs, on any terminal.
 mod book;
+mod help;
+mod kinds;
 mod log;
 mod mistakes;
 mod terminal;

@@ -21,7 +21,7 @@ impl Optimizer for Marquardt {
             Ok(descent) => descent,
             Err(outcome) => return *outcome,
         };
-        let (mut lambda, mut step) = (self.lambda, Step::default());
+        let (mut lambda, mut step) = (self.lambda, TrialStep::default());
         while lambda < 1e12 {
             if let Some(termination) = descent.next() {
                 return descent.end(termination);
@@ -29,10 +29,10 @@ impl Optimizer for Marquardt {
             let damping: Vec<f64> = descent.diagonal().iter().map(|d| lambda * d.max(1e-6)).collect();
             step.control = lambda;
             let lower = descent.damped(&damping, &mut step)
-                && matches!(descent.attempt(&step), Tried::Lower { gain } if gain > 1e-3);
+                && matches!(descent.attempt(&step), TrialResult::Lower { gain } if gain > 1e-3);
             descent.record(&step, lower);
             lambda *= if lower { 0.1 } else { 10.0 };
-            if let Some(termination) = if lower { descent.take(&step) } else { None } {
+            if let Some(termination) = if lower { descent.accept(&step) } else { None } {
                 return descent.end(termination);
             }
         }

@@ -4,9 +4,9 @@ use manifactor_document::{Diagnostic, Errors, Fault, Node, Place, Value, nearest
 use manifactor_graph::{GraphError, Key};
 
 /// Largest number of variables that are listed for an unknown key.
-const LISTED: usize = 12;
+const MAX_LISTED: usize = 12;
 /// Number of unknown keys for which the nearest known key is searched. Each search visits all variables.
-const SEARCHED: usize = 100;
+const MAX_SEARCHED: usize = 100;
 
 /// Reports all errors of the graph and its values.
 pub(super) fn check(read: &Read<'_>, root: &Place, errors: &Errors) {
@@ -15,7 +15,7 @@ pub(super) fn check(read: &Read<'_>, root: &Place, errors: &Errors) {
         if let Value::String(name) = &key.value
             && !read.variables.contains_key(name.as_str())
         {
-            errors.report(key.place.clone(), missing(read, name, unknown < SEARCHED));
+            errors.report(key.place.clone(), missing(read, name, unknown < MAX_SEARCHED));
             unknown += 1;
         }
     }
@@ -29,7 +29,7 @@ pub(super) fn check(read: &Read<'_>, root: &Place, errors: &Errors) {
 fn missing(read: &Read<'_>, key: &str, search: bool) -> Fault {
     let names = || read.variables.keys().map(Key::as_str);
     let known = match read.variables.len() {
-        0..=LISTED => names().map(str::to_owned).collect(),
+        0..=MAX_LISTED => names().map(str::to_owned).collect(),
         _ if search => nearest(key, names()).map(str::to_owned).into_iter().collect(),
         _ => Vec::new(),
     };
@@ -39,10 +39,10 @@ fn missing(read: &Read<'_>, key: &str, search: bool) -> Fault {
 /// Lists the variables of the type that a factor expects.
 fn of_type(read: &Read<'_>, expected: &str) -> String {
     let fit = read.values.iter().filter(|(_, value)| value.typetag_name() == expected);
-    let keys: Vec<String> = fit.take(LISTED + 1).map(|(key, _)| key.to_string()).collect();
+    let keys: Vec<String> = fit.take(MAX_LISTED + 1).map(|(key, _)| key.to_string()).collect();
     match keys.len() {
         0 => format!("no variable here is of type `{expected}`: add one, or take another factor"),
-        1..=LISTED => format!("of type `{expected}`: {}", quoted_list(&keys)),
+        1..=MAX_LISTED => format!("of type `{expected}`: {}", quoted_list(&keys)),
         _ => format!("many others are of type `{expected}`"),
     }
 }

@@ -105,7 +105,7 @@ pub(super) struct Read<'a> {
 
 impl<'a> Read<'a> {
     fn variable(&mut self, node: &'a Node, errors: &Errors) {
-        let read = node.read_what_is_right::<VariableDocument>(&[], errors);
+        let read = node.read_partial::<VariableDocument>(&[], errors);
         let key = match (&read, node.field("key")) {
             (Some(variable), _) => variable.key.clone(),
             // a variable with errors still counts as declared
@@ -131,7 +131,7 @@ impl<'a> Read<'a> {
     }
 
     fn factor(&mut self, node: &'a Node, errors: &Errors) {
-        let read = node.read_what_is_right(&[], errors);
+        let read = node.read_partial(&[], errors);
         let Some(FactorDocument { keys, name, factor, noise, loss }) = read else {
             return self.unread.push(node);
         };

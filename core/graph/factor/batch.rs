@@ -10,7 +10,7 @@ use crate::loss::{Loss, LossColumn};
 use crate::noise::{Whitener, Whiteners};
 use crate::residual::normal_equations::{NormalEquations, Slot};
 use crate::variable::column::{Columns, FIXED};
-use pass::{CHUNK, COST, Work};
+use pass::{CHUNK, COST_SHARE, Work};
 use pulp::Arch;
 use std::any::Any;
 use std::time::Instant;
@@ -28,7 +28,7 @@ pub struct Member<'a> {
     /// Start of each variable in the linear system; [`FIXED`] for fixed variables.
     pub starts: &'a [u32],
     /// For each variable, one bit per tangent direction: set if the direction is fixed.
-    pub held: &'a [u32],
+    pub fixed: &'a [u32],
     /// Slots of its blocks in H.
     pub slots: &'a [Slot],
     /// Its noise.
@@ -45,7 +45,7 @@ pub struct Evaluation {
     /// Number of factors that were undefined at the last linearization, and so are excluded.
     pub inactive: usize,
     /// Number of active factors that are undefined at these values.
-    pub left: usize,
+    pub became_undefined: usize,
     /// Index in the graph of a factor whose cost is not finite.
     pub not_finite: Option<usize>,
 }
@@ -53,11 +53,11 @@ pub struct Evaluation {
 impl Evaluation {
     /// Returns the sum of both evaluations. `not_finite` comes from `self` if both have one.
     #[must_use]
-    pub fn and(self, other: Self) -> Self {
+    pub fn merge(self, other: Self) -> Self {
         Self {
             cost: self.cost + other.cost,
             inactive: self.inactive + other.inactive,
-            left: self.left + other.left,
+            became_undefined: self.became_undefined + other.became_undefined,
             not_finite: self.not_finite.or(other.not_finite),
         }
     }
@@ -104,7 +104,7 @@ pub trait Batch: Send + Sync {
     fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool;
     /// Returns whether the parameters of a factor fit this batch. True by default; a batch that is
     /// evaluated in one call requires equal parameters.
-    fn takes(&self, _factor: &dyn Any) -> bool {
+    fn accepts_parameters(&self, _factor: &dyn Any) -> bool {
         true
     }
     /// Reserves room for `factors` more factors, with `variables` variables in total.
@@ -151,8 +151,8 @@ pub trait Batch: Send + Sync {
     /// Sets the weight of factor `index` of the batch.
     fn set_weight(&mut self, index: usize, weight: f64);
     /// Sets the fixed variables and directions of factor `index` of the batch: see [`Member::starts`] and
-    /// [`Member::held`].
-    fn hold(&mut self, index: usize, starts: &[u32], held: &[u32]);
+    /// [`Member::fixed`].
+    fn set_fixed(&mut self, index: usize, starts: &[u32], fixed: &[u32]);
     /// Returns whether factor `index` was defined at its last linearization.
     fn is_active(&self, index: usize) -> bool;
 }
@@ -161,13 +161,13 @@ pub trait Batch: Send + Sync {
 pub(crate) struct BatchOf<F: Kernel> {
     factors: Vec<F>,
     entries: Vec<u32>,
-    /// The variables of factor i are `ends[i-1]..ends[i]` of `index`, `starts`, `free` and `held`.
+    /// The variables of factor i are `ends[i-1]..ends[i]` of `index`, `starts`, `free` and `fixed`.
     ends: Vec<u32>,
     index: Vec<u32>,
     starts: Vec<u32>,
     free: Vec<bool>,
     /// Empty if no direction of any variable is fixed.
-    held: Vec<u32>,
+    fixed: Vec<u32>,
     slot_ends: Vec<u32>,
     slots: Vec<Slot>,
     whiteners: Whiteners<F::Dim>,
@@ -193,7 +193,7 @@ impl<F: Kernel> BatchOf<F> {
             index: vec![],
             starts: vec![],
             free: vec![],
-            held: vec![],
+            fixed: vec![],
             slot_ends: vec![],
             slots: vec![],
             whiteners: Whiteners::like(noise),
@@ -240,11 +240,11 @@ impl<F: Kernel> Batch for BatchOf<F> {
 
     fn push(&mut self, member: &Member<'_>) {
         let Some(factor) = F::of(member.factor) else { return };
-        if !member.held.iter().all(|h| *h == 0) {
-            self.held.resize(self.index.len(), 0);
-            self.held.extend_from_slice(member.held);
-        } else if !self.held.is_empty() {
-            self.held.extend(member.index.iter().map(|_| 0));
+        if !member.fixed.iter().all(|h| *h == 0) {
+            self.fixed.resize(self.index.len(), 0);
+            self.fixed.extend_from_slice(member.fixed);
+        } else if !self.fixed.is_empty() {
+            self.fixed.extend(member.index.iter().map(|_| 0));
         }
         self.factors.push(factor);
         self.entries.push(member.entry as u32);
@@ -278,7 +278,9 @@ impl<F: Kernel> Batch for BatchOf<F> {
         let total = if self.in_parallel(1.0) {
             let mut work = std::mem::take(&mut self.work);
             let mut total = Evaluation::default();
-            threads::enter(&mut || total = self.linearize_together(columns, &mut active, &mut work, to));
+            threads::run_in_pool(&mut || {
+                total = self.linearize_together(columns, &mut active, &mut work, to)
+            });
             self.work = work;
             total
         } else {
@@ -294,14 +296,14 @@ impl<F: Kernel> Batch for BatchOf<F> {
     fn cost(&self, columns: &Columns) -> Evaluation {
         let columns = F::columns(columns);
         let chunks = self.factors.len().div_ceil(CHUNK);
-        if self.in_parallel(COST) {
+        if self.in_parallel(COST_SHARE) {
             let mut costs = vec![Evaluation::default(); chunks];
-            threads::enter(&mut || self.chunk_costs(columns, 0, &mut costs));
-            costs.into_iter().fold(Evaluation::default(), Evaluation::and)
+            threads::run_in_pool(&mut || self.chunk_costs(columns, 0, &mut costs));
+            costs.into_iter().fold(Evaluation::default(), Evaluation::merge)
         } else {
             (0..chunks)
                 .map(|n| self.chunk_cost(columns, n * CHUNK, self.chunk(n)))
-                .fold(Evaluation::default(), Evaluation::and)
+                .fold(Evaluation::default(), Evaluation::merge)
         }
     }
 
@@ -335,7 +337,7 @@ impl<F: Kernel> Batch for BatchOf<F> {
             residual.truncate(self.factors[i].rows());
             whitened.truncate(residual.len());
             let mut weight = [if defined { whitened.iter().map(|x| x * x).sum() } else { 0.0 }];
-            let cost = self.weigh(i, &mut weight, &[defined]);
+            let cost = self.weights_from_norms(i, &mut weight, &[defined]);
             let cost = if defined { cost } else { 0.0 };
             FactorState {
                 entry: self.entries[i] as usize,
@@ -390,7 +392,7 @@ impl<F: Kernel> Batch for BatchOf<F> {
         let columns = F::columns(columns);
         pass::runs(indices)
             .map(|(first, len)| self.chunk_cost(columns, first, len))
-            .fold(Evaluation::default(), Evaluation::and)
+            .fold(Evaluation::default(), Evaluation::merge)
     }
 
     fn robust_weights_at(&self, indices: &[u32], columns: &Columns, to: &mut Vec<f64>) {
@@ -411,8 +413,8 @@ impl<F: Kernel> Batch for BatchOf<F> {
         self.weights[index] = weight;
     }
 
-    fn hold(&mut self, index: usize, starts: &[u32], held: &[u32]) {
-        self.set_held(index, starts, held);
+    fn set_fixed(&mut self, index: usize, starts: &[u32], fixed: &[u32]) {
+        self.set_fixed_directions(index, starts, fixed);
     }
 
     fn is_active(&self, index: usize) -> bool {

@@ -40,14 +40,14 @@ pub fn invariances_of(entry: &catalogue::Entry) -> Vec<&'static Invariance> {
 }
 
 /// Moved variables of a factor: a tuple with one element for each, or a list.
-pub trait Moved {
+pub trait MovedVariables {
     /// Returns the variables as trait objects.
     fn boxed(self) -> Vec<Box<dyn Variable>>;
 }
 
 macro_rules! moved {
     ($($v:ident $i:tt),+) => {
-        impl<$($v: Variable + 'static),+> Moved for ($($v,)+) {
+        impl<$($v: Variable + 'static),+> MovedVariables for ($($v,)+) {
             fn boxed(self) -> Vec<Box<dyn Variable>> {
                 vec![$(Box::new(self.$i)),+]
             }
@@ -61,14 +61,14 @@ moved!(A 0, B 1, C 2, D 3);
 moved!(A 0, B 1, C 2, D 3, E 4);
 moved!(A 0, B 1, C 2, D 3, E 4, F_ 5);
 
-impl<M: Manifold + Variable> Moved for Vec<M> {
+impl<M: Manifold + Variable> MovedVariables for Vec<M> {
     fn boxed(self) -> Vec<Box<dyn Variable>> {
         self.into_iter().map(|x| Box::new(x) as Box<dyn Variable>).collect()
     }
 }
 
 #[doc(hidden)]
-pub fn apply<R: Residual, P: Moved>(
+pub fn apply<R: Residual, P: MovedVariables>(
     factor: &dyn Any,
     variables: &[&dyn Variable],
     random: Random<'_>,

@@ -69,7 +69,7 @@ impl RobustLoss for L2 {
 register_loss!("l2", L2);
 
 /// Below √s = k times this share, [`L1`] is a parabola.
-const SMALL: f64 = 1e-6;
+const PARABOLA_SHARE: f64 = 1e-6;
 
 loss! {
     /// The norm instead of its square: ρ = 2k√s.
@@ -82,8 +82,8 @@ loss! {
     /// ```
     L1, "l1", 1.0, |s, k| {
         let r = s.sqrt();
-        let small = SMALL * k;
-        if r < small { (s / SMALL, 1.0 / SMALL) } else { (k * (2.0 * r - small), k / r) }
+        let small = PARABOLA_SHARE * k;
+        if r < small { (s / PARABOLA_SHARE, 1.0 / PARABOLA_SHARE) } else { (k * (2.0 * r - small), k / r) }
     }
 }
 

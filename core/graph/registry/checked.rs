@@ -119,46 +119,46 @@ number! {
     pub Share: "a number from 0 to 1", |x| x >= 0.0 && x <= 1.0, { "minimum": 0, "maximum": 1 };
 }
 
-/// A whole number from `LEAST` to `MOST`.
+/// A whole number from `MIN` to `MAX`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(transparent)]
-pub struct Count<const LEAST: usize, const MOST: usize>(usize);
+pub struct Count<const MIN: usize, const MAX: usize>(usize);
 
-impl<const LEAST: usize, const MOST: usize> Count<LEAST, MOST> {
+impl<const MIN: usize, const MAX: usize> Count<MIN, MAX> {
     /// Makes a number from a literal. Outside the domain, a constant fails to compile, and a call at run
     /// time panics.
     #[track_caller]
     pub const fn literal(n: usize) -> Self {
-        assert!(LEAST <= n && n <= MOST);
+        assert!(MIN <= n && n <= MAX);
         Self(n)
     }
 }
 
-impl<const LEAST: usize, const MOST: usize> Deref for Count<LEAST, MOST> {
+impl<const MIN: usize, const MAX: usize> Deref for Count<MIN, MAX> {
     type Target = usize;
     fn deref(&self) -> &usize {
         &self.0
     }
 }
 
-impl<'de, const LEAST: usize, const MOST: usize> Deserialize<'de> for Count<LEAST, MOST> {
+impl<'de, const MIN: usize, const MAX: usize> Deserialize<'de> for Count<MIN, MAX> {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         match usize::deserialize(from)? {
-            n if (LEAST..=MOST).contains(&n) => Ok(Self(n)),
-            n if LEAST == 0 => Err(D::Error::custom(format!("expected a number of at most {MOST}, got {n}"))),
-            n => Err(D::Error::custom(format!("expected a number from {LEAST} to {MOST}, got {n}"))),
+            n if (MIN..=MAX).contains(&n) => Ok(Self(n)),
+            n if MIN == 0 => Err(D::Error::custom(format!("expected a number of at most {MAX}, got {n}"))),
+            n => Err(D::Error::custom(format!("expected a number from {MIN} to {MAX}, got {n}"))),
         }
     }
 }
 
-impl<const LEAST: usize, const MOST: usize> JsonSchema for Count<LEAST, MOST> {
+impl<const MIN: usize, const MAX: usize> JsonSchema for Count<MIN, MAX> {
     fn inline_schema() -> bool {
         true
     }
     fn schema_name() -> std::borrow::Cow<'static, str> {
-        format!("from_{LEAST}_to_{MOST}").into()
+        format!("from_{MIN}_to_{MAX}").into()
     }
     fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
-        schemars::json_schema!({ "type": "integer", "format": "uint", "minimum": LEAST, "maximum": MOST })
+        schemars::json_schema!({ "type": "integer", "format": "uint", "minimum": MIN, "maximum": MAX })
     }
 }

@@ -127,7 +127,7 @@ impl Order {
         let p = pivot as usize;
         let range = self.new_element(pivot);
         self.range[element as usize] = (range.start as u32, range.end as u32);
-        self.look_outside(pivot, &range);
+        self.count_outside(pivot, &range);
         let reach: u32 = self.members[range.clone()].iter().map(|v| self.dim[*v as usize]).sum();
         let mut group = Group { blocks: vec![pivot], rows: vec![] };
         for i in range.clone() {
@@ -188,7 +188,7 @@ impl Order {
     }
 
     /// Counts, for each element of the pivot's neighbours, the scalars that are not neighbours of the pivot.
-    fn look_outside(&mut self, pivot: u32, neighbours: &std::ops::Range<usize>) {
+    fn count_outside(&mut self, pivot: u32, neighbours: &std::ops::Range<usize>) {
         for i in neighbours.clone() {
             let v = self.members[i] as usize;
             for &e in &self.elements[v] {

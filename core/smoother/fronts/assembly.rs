@@ -12,14 +12,14 @@ pub(super) struct Run {
 
 /// A front under assembly: a panel of `width` columns, and the update with the remaining columns. The last
 /// row of both is the right-hand side.
-pub(super) struct Open<'a> {
+pub(super) struct FrontAssembly<'a> {
     pub(super) panel: &'a mut [f64],
     pub(super) update: &'a mut [f64],
     pub(super) width: usize,
     pub(super) height: usize,
 }
 
-impl Open<'_> {
+impl FrontAssembly<'_> {
     /// Returns a column with the number of its first row: 0 in the panel, `width` in the update.
     #[inline(always)]
     fn column<const PANEL: bool>(&mut self, column: usize) -> (&mut [f64], usize) {
@@ -40,7 +40,7 @@ impl Open<'_> {
 /// entries below the child's diagonal can belong above the parent's diagonal. These are added to the mirrored
 /// position.
 #[inline(always)]
-pub(super) fn assemble<const PANEL: bool>(from: &[f64], n: usize, runs: &[Run], to: &mut Open<'_>) {
+pub(super) fn assemble<const PANEL: bool>(from: &[f64], n: usize, runs: &[Run], to: &mut FrontAssembly<'_>) {
     let width = to.width;
     for (r, run) in runs.iter().enumerate() {
         let later = &runs[r + 1..];
@@ -96,14 +96,14 @@ mod tests {
             }
             let (height, below) = (10, 10 - width);
             let (mut panel, mut update) = (vec![0.0; width * height], vec![0.0; below * below]);
-            let mut open = Open { panel: &mut panel, update: &mut update, width, height };
+            let mut open = FrontAssembly { panel: &mut panel, update: &mut update, width, height };
             assemble::<true>(&from, n + 1, &runs, &mut open);
             assemble::<false>(&from, n + 1, &runs, &mut open);
             for c in 0..height {
                 for r in c..height {
-                    let is_there = places.contains(&r) && places.contains(&c);
+                    let is_present = places.contains(&r) && places.contains(&c);
                     let found = if c < width { panel[c * height + r] } else { update[(c - width) * below + r - width] };
-                    prop_assert_eq!(found, if is_there { value(r, c) } else { 0.0 });
+                    prop_assert_eq!(found, if is_present { value(r, c) } else { 0.0 });
                 }
             }
         }

@@ -1,5 +1,5 @@
 //! Computation of a front: factor terms, updates of its children, and elimination of its columns.
-use super::assembly::{Open, Run, assemble};
+use super::assembly::{FrontAssembly, Run, assemble};
 use super::{Fronts, Numbers, Scalar};
 use crate::elimination_tree::{Front, Tree};
 use crate::model::{Blocks, Overflow};
@@ -9,7 +9,7 @@ use pulp::{Simd, WithSimd};
 /// A pivot below this share of the diagonal entry of H is rounding error, so no factor constrains the
 /// direction. It is held at its linearization point. Batch solvers do not move such a direction either,
 /// because it has no gradient.
-const OPEN: f64 = 1e-14;
+const MIN_PIVOT_SHARE: f64 = 1e-14;
 /// Assembly and elimination of new fronts.
 pub(super) struct Build<'a> {
     pub(super) fronts: &'a mut Fronts,
@@ -45,7 +45,7 @@ fn build<S: Simd>(
     let front = &tree.fronts[f as usize];
     let height = front.width + front.below + 1;
     let (entries, below) = (front.width * height, front.below + 1);
-    let (mut panel, mut update) = (fronts.pool.take(entries), fronts.pool.take(below * below));
+    let (mut panel, mut update) = (fronts.pool.acquire(entries), fronts.pool.acquire(below * below));
     let mut held: Vec<usize> = vec![];
     let built = loop {
         let (panel, update) = (&mut panel[..entries], &mut update[..below * below]);
@@ -54,15 +54,15 @@ fn build<S: Simd>(
             let precision = precision_of(blocks, front, *c);
             panel[c * (height + 1)] += if precision > 0.0 { precision * precision } else { 1.0 };
         }
-        let mut open = Open { panel, update, width: front.width, height };
-        take_children::<true>(fronts, tree, blocks, front, &mut open);
+        let mut open = FrontAssembly { panel, update, width: front.width, height };
+        add_children::<true>(fronts, tree, blocks, front, &mut open);
         let eliminated =
             eliminate::<S, true>(simd, open.panel, open.update, front.width, &mut fronts.scratch);
-        let failed = eliminated.err().or_else(|| first_open(blocks, front, open.panel, &held));
+        let failed = eliminated.err().or_else(|| first_unconstrained(blocks, front, open.panel, &held));
         match failed {
             None => {
                 let is_finite = (0..front.width).all(|c| open.panel[(c + 1) * height - 1].is_finite());
-                take_children::<false>(fronts, tree, blocks, front, &mut open);
+                add_children::<false>(fronts, tree, blocks, front, &mut open);
                 break if is_finite { Ok(()) } else { Err(front.width - 1) };
             }
             Some(column) if held.contains(&column) => break Err(column),
@@ -71,8 +71,8 @@ fn build<S: Simd>(
     };
     // a failed front still owns its memory, so that dropping it returns the memory to the pool
     held.sort_unstable();
-    let open = held.iter().map(|c| scalar_of(blocks, front, *c)).collect();
-    fronts.numbers[f as usize] = Numbers { panel, update, open };
+    let undetermined = held.iter().map(|c| scalar_of(blocks, front, *c)).collect();
+    fronts.numbers[f as usize] = Numbers { panel, update, undetermined };
     built.map_err(|column| Overflow(scalar_of(blocks, front, column).0))
 }
 
@@ -96,13 +96,13 @@ fn precision_of(blocks: &Blocks, front: &Front, column: usize) -> f64 {
 
 /// Returns the first column of a factorized panel whose pivot is only rounding error.
 #[inline(always)]
-fn first_open(blocks: &Blocks, front: &Front, panel: &[f64], held: &[usize]) -> Option<usize> {
+fn first_unconstrained(blocks: &Blocks, front: &Front, panel: &[f64], held: &[usize]) -> Option<usize> {
     let height = front.width + front.below + 1;
     let mut column = 0;
     for v in &front.blocks {
         for precision in blocks.precision(*v) {
             let pivot = panel[column * (height + 1)];
-            if pivot * pivot < OPEN * precision * precision && !held.contains(&column) {
+            if pivot * pivot < MIN_PIVOT_SHARE * precision * precision && !held.contains(&column) {
                 return Some(column);
             }
             column += 1;
@@ -155,12 +155,12 @@ fn fill(fronts: &mut Fronts, blocks: &Blocks, front: &Front, panel: &mut [f64]) 
 /// Adds the updates of a front's children: to its panel before elimination, or to its update afterwards. The
 /// update therefore needs no fill with zeros.
 #[inline(always)]
-fn take_children<const PANEL: bool>(
+fn add_children<const PANEL: bool>(
     fronts: &mut Fronts,
     tree: &Tree,
     blocks: &Blocks,
     front: &Front,
-    open: &mut Open<'_>,
+    open: &mut FrontAssembly<'_>,
 ) {
     for c in &front.children {
         let child = &tree.fronts[*c as usize];

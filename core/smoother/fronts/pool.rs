@@ -11,7 +11,7 @@ pub(super) struct Pool {
 
 /// Largest number of free values, or half of the values in use if that is more. Only an update that rebuilds
 /// everything needs more.
-const WAITING: usize = 1 << 18;
+const MAX_FREE_VALUES: usize = 1 << 18;
 
 /// Returns the class for `n` values, and its size.
 fn class(n: usize) -> (usize, usize) {
@@ -25,7 +25,7 @@ fn class(n: usize) -> (usize, usize) {
 
 impl Pool {
     /// Returns a list of at least `n` values with undefined content.
-    pub(super) fn take(&mut self, n: usize) -> Vec<f64> {
+    pub(super) fn acquire(&mut self, n: usize) -> Vec<f64> {
         if n == 0 {
             return vec![];
         }
@@ -40,9 +40,9 @@ impl Pool {
         }
     }
 
-    pub(super) fn give(&mut self, values: Vec<f64>) {
+    pub(super) fn release(&mut self, values: Vec<f64>) {
         self.used -= values.len();
-        if values.is_empty() || self.waiting + values.len() > WAITING.max(self.used / 2) {
+        if values.is_empty() || self.waiting + values.len() > MAX_FREE_VALUES.max(self.used / 2) {
             return;
         }
         self.waiting += values.len();
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_class_wastes_an_eighth_at_most_and_gives_back_what_it_took() {
+    fn a_class_wastes_an_eighth_at_most_and_releases_all_it_acquired() {
         for n in 16..5000 {
             let (number, size) = class(n);
             assert!(size >= n && 8 * (size - n) <= n, "{n}: {size}");
@@ -76,8 +76,8 @@ mod tests {
     #[test]
     fn what_waits_is_capped() {
         let mut pool = Pool::default();
-        let many: Vec<_> = (0..100).map(|_| pool.take(1 << 14)).collect();
-        many.into_iter().for_each(|values| pool.give(values));
+        let many: Vec<_> = (0..100).map(|_| pool.acquire(1 << 14)).collect();
+        many.into_iter().for_each(|values| pool.release(values));
         assert!(pool.bytes() <= 8 * (50 << 14), "half of what was in use");
     }
 }

@@ -2,7 +2,7 @@
 use pulp::{Simd, WithSimd};
 
 /// Number of columns whose sums run in parallel; they do not depend on each other.
-const COLUMNS: usize = 4;
+const PARALLEL_COLUMNS: usize = 4;
 
 /// Computes x ← L₁⁻ᵀ (y − L₂ᵀ x₂). `x` holds `width` unknowns of the panel's columns, then x₂, the values of
 /// its rows. y is the last row of the panel.
@@ -21,7 +21,7 @@ impl WithSimd for Backward<'_> {
         let height = panel.len() / width;
         let mut end = width;
         while end > 0 {
-            let first = (end - 1) / COLUMNS * COLUMNS;
+            let first = (end - 1) / PARALLEL_COLUMNS * PARALLEL_COLUMNS;
             let columns = &panel[first * height..end * height];
             let sums = dots(simd, columns, height, end, &x[end..height - 1]);
             for c in (first..end).rev() {
@@ -37,7 +37,7 @@ impl WithSimd for Backward<'_> {
 /// Returns the products of up to four columns, from row `from` on, with a vector. It has no closure, because
 /// that would be compiled for the baseline instruction set.
 #[inline(always)]
-fn dots<S: Simd>(simd: S, columns: &[f64], height: usize, from: usize, x: &[f64]) -> [f64; COLUMNS] {
+fn dots<S: Simd>(simd: S, columns: &[f64], height: usize, from: usize, x: &[f64]) -> [f64; PARALLEL_COLUMNS] {
     // with fewer than four columns, the last one is repeated
     let last = columns.len() / height - 1;
     let (a, a_tail) = S::as_simd_f64s(&columns[from..][..x.len()]);
@@ -45,14 +45,14 @@ fn dots<S: Simd>(simd: S, columns: &[f64], height: usize, from: usize, x: &[f64]
     let (c, c_tail) = S::as_simd_f64s(&columns[last.min(2) * height + from..][..x.len()]);
     let (d, d_tail) = S::as_simd_f64s(&columns[last.min(3) * height + from..][..x.len()]);
     let (x, x_tail) = S::as_simd_f64s(x);
-    let mut sums = [simd.splat_f64s(0.0); COLUMNS];
+    let mut sums = [simd.splat_f64s(0.0); PARALLEL_COLUMNS];
     for ((((x, a), b), c), d) in x.iter().zip(a).zip(b).zip(c).zip(d) {
         sums[0] = simd.mul_add_f64s(*a, *x, sums[0]);
         sums[1] = simd.mul_add_f64s(*b, *x, sums[1]);
         sums[2] = simd.mul_add_f64s(*c, *x, sums[2]);
         sums[3] = simd.mul_add_f64s(*d, *x, sums[3]);
     }
-    let mut total = [0.0; COLUMNS];
+    let mut total = [0.0; PARALLEL_COLUMNS];
     for (total, sum) in total.iter_mut().zip(sums) {
         *total = simd.reduce_sum_f64s(sum);
     }

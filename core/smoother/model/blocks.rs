@@ -134,7 +134,7 @@ impl Blocks {
     pub(crate) fn factors(&self, variable: u32) -> impl Iterator<Item = u32> {
         self.variables[variable as usize].factors.iter().map(|part| part.factor)
     }
-    pub(crate) fn hold(&mut self, variable: u32, held: u32) {
+    pub(crate) fn set_held(&mut self, variable: u32, held: u32) {
         self.variables[variable as usize].held = held;
         self.mark(variable);
     }

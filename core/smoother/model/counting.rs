@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 impl Model {
     /// Sets the weight of a factor. Returns the previous weight.
-    pub(crate) fn weigh(&mut self, number: u32, weight: f64) -> Option<f64> {
+    pub(crate) fn set_weight(&mut self, number: u32, weight: f64) -> Option<f64> {
         let factor = self.factors.get_mut(number)?;
         self.batches.as_mut_slice()[factor.batch as usize].set_weight(factor.index as usize, weight);
         Some(std::mem::replace(&mut factor.weight, weight))
@@ -35,7 +35,7 @@ impl Model {
         };
         self.blocks.connect(number, factor.region, &factor.members);
         // the held directions may have changed since
-        self.hold_in(number);
+        self.pass_held_directions(number);
         true
     }
 
@@ -56,19 +56,19 @@ impl Model {
     }
 
     /// Passes the held directions of a factor's variables to its batch.
-    pub(crate) fn hold_in(&mut self, number: u32) {
+    pub(crate) fn pass_held_directions(&mut self, number: u32) {
         let Some(factor) = self.factors.get(number).filter(|factor| factor.entry.is_some()) else { return };
         let (starts, held) = self.starts(factor, self.regions[factor.region]);
-        self.batches.as_mut_slice()[factor.batch as usize].hold(factor.index as usize, &starts, &held);
+        self.batches.as_mut_slice()[factor.batch as usize].set_fixed(factor.index as usize, &starts, &held);
     }
 
     /// Sets the held directions of a variable. Returns the previous ones. The caller linearizes its factors
     /// afterwards.
-    pub(crate) fn hold(&mut self, variable: u32, held: u32) -> u32 {
-        let before = std::mem::replace(&mut self.places[variable as usize].held, held);
-        self.blocks.hold(variable, held);
+    pub(crate) fn set_held(&mut self, variable: u32, held: u32) -> u32 {
+        let before = std::mem::replace(&mut self.records[variable as usize].held, held);
+        self.blocks.set_held(variable, held);
         for f in self.blocks.factors(variable).collect::<Vec<_>>() {
-            self.hold_in(f);
+            self.pass_held_directions(f);
         }
         before
     }
@@ -87,9 +87,9 @@ impl Model {
         self.is_defined(number) && self.factor(number).is_some_and(|factor| factor.weight != 0.0)
     }
 
-    /// Returns whether a factor is not rejected and has no parked variable.
+    /// Returns whether a factor is not rejected and has no undetermined variable.
     pub(crate) fn is_whole(&self, number: u32) -> bool {
-        let is_in = |factor: &Factor| factor.variables().all(|v| !self.is_parked(v));
+        let is_in = |factor: &Factor| factor.variables().all(|v| !self.is_undetermined(v));
         self.factor(number).is_some_and(|factor| !self.is_rejected(number) && is_in(factor))
     }
 

@@ -21,7 +21,7 @@ impl Model {
         for (b, indices) in listed.iter_mut().enumerate().filter(|(_, indices)| !indices.is_empty()) {
             indices.sort_unstable();
             let to = &mut self.regions.normal_equations();
-            total = total.and(self.batches.as_mut_slice()[b].linearize_at(indices, &self.trial, to));
+            total = total.merge(self.batches.as_mut_slice()[b].linearize_at(indices, &self.trial, to));
             indices.clear();
         }
         self.listed = listed;
@@ -56,7 +56,7 @@ impl Model {
             true => self.batches.as_slice()[factor.batch as usize].cost_at(&[factor.index], &self.trial),
             false => self.prior_cost(factor, delta),
         };
-        factors.map(one).fold(Evaluation::default(), Evaluation::and)
+        factors.map(one).fold(Evaluation::default(), Evaluation::merge)
     }
 
     /// Returns whether any factor has a robust loss.
@@ -132,7 +132,7 @@ impl Model {
 
     /// Moves the trial point of a variable by a step from its linearization point.
     pub(crate) fn try_step(&mut self, variable: u32, step: &[f64]) {
-        let (column, index) = self.places[variable as usize].in_columns();
+        let (column, index) = self.records[variable as usize].in_columns();
         self.trial.column_mut(column).retract_at(self.points.column(column), index, step);
     }
 
@@ -143,7 +143,7 @@ impl Model {
     /// and loading.
     pub(crate) fn try_point(&mut self, variable: u32, step: &[f64]) {
         self.try_step(variable, step);
-        let (column, index) = self.places[variable as usize].in_columns();
+        let (column, index) = self.records[variable as usize].in_columns();
         let trial = self.trial.column_mut(column);
         let point = trial.get(index).and_then(|point| plain(&*point));
         if let Some(point) = point {
@@ -153,13 +153,13 @@ impl Model {
 
     /// Resets the trial point of a variable to its linearization point.
     pub(crate) fn reset_trial(&mut self, variable: u32) {
-        let (column, index) = self.places[variable as usize].in_columns();
+        let (column, index) = self.records[variable as usize].in_columns();
         self.trial.column_mut(column).copy_at(self.points.column(column), index);
     }
 
     /// Sets the linearization point of a variable to its trial point.
     pub(crate) fn accept(&mut self, variable: u32) {
-        let (column, index) = self.places[variable as usize].in_columns();
+        let (column, index) = self.records[variable as usize].in_columns();
         self.points.column_mut(column).copy_at(self.trial.column(column), index);
     }
 }

@@ -2,7 +2,7 @@
 //! insertion. A page without factors takes eight bytes.
 use super::Factor;
 
-const PAGE: usize = 256;
+const PAGE_SIZE: usize = 256;
 
 #[derive(Default)]
 struct Page {
@@ -20,18 +20,18 @@ pub(super) struct Factors {
 
 impl Factors {
     pub(super) fn get(&self, number: u32) -> Option<&Factor> {
-        let page = self.pages.get(number as usize / PAGE)?.as_ref()?;
-        page.factors.get(number as usize % PAGE)?.as_ref()
+        let page = self.pages.get(number as usize / PAGE_SIZE)?.as_ref()?;
+        page.factors.get(number as usize % PAGE_SIZE)?.as_ref()
     }
 
     pub(super) fn get_mut(&mut self, number: u32) -> Option<&mut Factor> {
-        let page = self.pages.get_mut(number as usize / PAGE)?.as_mut()?;
-        page.factors.get_mut(number as usize % PAGE)?.as_mut()
+        let page = self.pages.get_mut(number as usize / PAGE_SIZE)?.as_mut()?;
+        page.factors.get_mut(number as usize % PAGE_SIZE)?.as_mut()
     }
 
     /// Inserts a factor under an unused number.
     pub(super) fn insert(&mut self, number: u32, factor: Factor) {
-        let (page, place) = (number as usize / PAGE, number as usize % PAGE);
+        let (page, place) = (number as usize / PAGE_SIZE, number as usize % PAGE_SIZE);
         if self.pages.len() <= page {
             self.pages.resize_with(page + 1, || None);
         }
@@ -45,9 +45,9 @@ impl Factors {
     }
 
     pub(super) fn remove(&mut self, number: u32) -> Option<Factor> {
-        let slot = self.pages.get_mut(number as usize / PAGE)?;
+        let slot = self.pages.get_mut(number as usize / PAGE_SIZE)?;
         let page = slot.as_mut()?;
-        let factor = page.factors.get_mut(number as usize % PAGE)?.take()?;
+        let factor = page.factors.get_mut(number as usize % PAGE_SIZE)?.take()?;
         page.len -= 1;
         if page.len == 0 {
             *slot = None;
@@ -60,7 +60,7 @@ impl Factors {
         self.pages.iter().enumerate().flat_map(|(p, page)| {
             page.iter()
                 .flat_map(|page| page.factors.iter().enumerate())
-                .filter_map(move |(i, factor)| Some(((p * PAGE + i) as u32, factor.as_ref()?)))
+                .filter_map(move |(i, factor)| Some(((p * PAGE_SIZE + i) as u32, factor.as_ref()?)))
         })
     }
 }

@@ -12,7 +12,7 @@ pub(crate) struct Region {
     pub h: usize,
     pub g: usize,
     pub scalars: u32,
-    /// True if the region is included in the sums. It is not if a variable is parked.
+    /// True if the region is included in the sums. It is not if a variable is undetermined.
     pub counts: bool,
 }
 
@@ -50,7 +50,7 @@ impl Index<u32> for Regions {
 
 impl Regions {
     /// Returns the index of an unused region, and includes it in the sums.
-    pub(crate) fn take(&mut self, scalars: u32) -> u32 {
+    pub(crate) fn acquire(&mut self, scalars: u32) -> u32 {
         if let Some(place) = self.unused.get_mut(&scalars).and_then(Vec::pop) {
             self.all[place as usize].counts = true;
             return place;
@@ -62,7 +62,7 @@ impl Regions {
         self.all.len() as u32 - 1
     }
 
-    pub(crate) fn give(&mut self, place: u32) {
+    pub(crate) fn release(&mut self, place: u32) {
         self.unused.entry(self[place].scalars).or_default().push(place);
     }
 

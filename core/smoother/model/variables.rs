@@ -1,6 +1,6 @@
 //! Insertion and removal of variables. The number of a removed variable is reused by the next one of its
 //! type, so that memory depends only on the present variables.
-use super::{Model, Place, evaluation::plain};
+use super::{Model, VariableRecord, evaluation::plain};
 use manifactor_graph::{Key, Variable};
 use std::any::TypeId;
 
@@ -36,12 +36,12 @@ impl Model {
             }
             None => {
                 reserved.new += 1;
-                NewNumber { number: self.places.len() as u32 + reserved.new - 1, is_reused: false }
+                NewNumber { number: self.records.len() as u32 + reserved.new - 1, is_reused: false }
             }
         }
     }
 
-    /// Inserts a variable under its reserved number. It is parked until its factors are checked.
+    /// Inserts a variable under its reserved number. It is undetermined until its factors are checked.
     pub(crate) fn push_variable(&mut self, key: Key, value: &dyn Variable, held: u32, at: NewNumber) {
         let (id, tangent) = (value.erased().type_id(), value.erased().tangent());
         let column = self.points.position(id).unwrap_or_else(|| {
@@ -53,72 +53,72 @@ impl Model {
         let plain = plain(value);
         let value = plain.as_deref().unwrap_or(value);
         self.numbers.insert(key.clone(), at.number);
-        self.born += 1;
+        self.added += 1;
         self.ordinals[column] += 1;
-        self.parked.set(at.number, true);
-        let mut place = Place {
+        self.undetermined.set(at.number, true);
+        let mut place = VariableRecord {
             key,
-            born: self.born,
+            rank: self.added,
             ordinal: self.ordinals[column],
-            is_there: true,
+            is_present: true,
             column: column as u32,
             index: self.points.column(column).len() as u32,
             tangent,
             held,
-            sealed: 0,
+            prior_count: 0,
         };
         if at.is_reused {
             self.unused[column].pop();
-            place.index = self.places[at.number as usize].index;
+            place.index = self.records[at.number as usize].index;
             self.points.column_mut(column).set(place.index as usize, value);
             self.trial.column_mut(column).set(place.index as usize, value);
-            self.places[at.number as usize] = place;
-            self.blocks.hold(at.number, held);
+            self.records[at.number as usize] = place;
+            self.blocks.set_held(at.number, held);
         } else {
             self.points.column_mut(column).push(value);
             self.trial.column_mut(column).push(value);
-            self.places.push(place);
+            self.records.push(place);
             self.blocks.push(tangent.len(), held);
         }
     }
 
     /// Undoes the insertion of a variable. The last insertion is undone first.
-    pub(crate) fn take_out(&mut self, at: NewNumber) {
-        self.born -= 1;
-        self.ordinals[self.places[at.number as usize].column as usize] -= 1;
+    pub(crate) fn undo_push(&mut self, at: NewNumber) {
+        self.added -= 1;
+        self.ordinals[self.records[at.number as usize].column as usize] -= 1;
         if at.is_reused {
             self.forget(at.number);
             return;
         }
-        let Some(place) = self.places.pop() else { return };
+        let Some(place) = self.records.pop() else { return };
         self.numbers.remove(&place.key);
-        self.parked.set(at.number, false);
+        self.undetermined.set(at.number, false);
         for columns in [&mut self.points, &mut self.trial] {
             columns.column_mut(place.column as usize).truncate(place.index as usize);
         }
-        self.blocks.truncate(self.places.len());
+        self.blocks.truncate(self.records.len());
     }
 
     /// Removes a variable that has no factors.
     pub(crate) fn forget(&mut self, variable: u32) {
-        let place = &mut self.places[variable as usize];
-        place.is_there = false;
+        let place = &mut self.records[variable as usize];
+        place.is_present = false;
         self.numbers.remove(&place.key);
         self.unused[place.column as usize].push(variable);
-        self.parked.set(variable, false);
+        self.undetermined.set(variable, false);
     }
 
     /// Returns the present variables in the order of their insertion.
     pub(crate) fn by_age(&self) -> Vec<u32> {
-        let is_there = |v: &u32| self.places[*v as usize].is_there;
-        let mut all: Vec<u32> = (0..self.places.len() as u32).filter(is_there).collect();
-        all.sort_unstable_by_key(|v| self.places[*v as usize].born);
+        let is_present = |v: &u32| self.records[*v as usize].is_present;
+        let mut all: Vec<u32> = (0..self.records.len() as u32).filter(is_present).collect();
+        all.sort_unstable_by_key(|v| self.records[*v as usize].rank);
         all
     }
 
     /// Returns the number of variables ever added.
-    pub(crate) fn born(&self) -> u64 {
-        self.born
+    pub(crate) fn added(&self) -> u64 {
+        self.added
     }
 
     /// Returns the number of variables ever added by type, in the order in which the types first appear. A
@@ -126,7 +126,7 @@ impl Model {
     /// have it.
     pub(crate) fn ordinals(&self) -> Vec<u64> {
         let mut columns: Vec<u32> = vec![];
-        for place in &self.places {
+        for place in &self.records {
             if !columns.contains(&place.column) {
                 columns.push(place.column);
             }
@@ -141,23 +141,23 @@ impl Model {
     }
 
     /// Restores the counts and the removed variables of a saved model. Returns whether they are consistent.
-    pub(crate) fn restore(&mut self, born: u64, ordinals: &[u64], unused: &[u32]) -> bool {
+    pub(crate) fn restore(&mut self, added: u64, ordinals: &[u64], unused: &[u32]) -> bool {
         if ordinals.len() != self.ordinals.len() {
             return false;
         }
-        self.born = born;
+        self.added = added;
         self.ordinals.copy_from_slice(ordinals);
         self.numbers.clear();
-        for (v, place) in self.places.iter().enumerate().filter(|(_, place)| place.is_there) {
+        for (v, place) in self.records.iter().enumerate().filter(|(_, place)| place.is_present) {
             self.numbers.insert(place.key.clone(), v as u32);
         }
         let mut seen = std::collections::BTreeSet::new();
-        let is_gone = |v: &u32| self.places.get(*v as usize).is_some_and(|place| !place.is_there);
+        let is_gone = |v: &u32| self.records.get(*v as usize).is_some_and(|place| !place.is_present);
         if !unused.iter().all(|v| is_gone(v) && seen.insert(*v)) {
             return false;
         }
         for v in unused {
-            let column = self.places[*v as usize].column as usize;
+            let column = self.records[*v as usize].column as usize;
             self.unused[column].push(*v);
         }
         true

@@ -1,20 +1,20 @@
 //! Settings of the window.
-use manifactor_graph::catalogue;
 use manifactor_graph::checked::Positive;
+use manifactor_graph::{TypeName, Variable};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 
 /// A window that moves with the newest variables. Older variables are marginalized at the end of an update,
-/// as by [`Session::marginalize`](crate::Session::marginalize).
+/// as by [`Smoother::marginalize`](crate::Smoother::marginalize).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "Document", into = "Document")]
-#[schemars(with = "Document")]
+#[serde(try_from = "WindowDocument", into = "WindowDocument")]
+#[schemars(with = "WindowDocument")]
 pub struct Window {
     /// Length of the window.
     pub span: Span,
     /// Types whose variables always stay.
-    pub keep: Vec<ManifoldType>,
+    pub keep: Vec<TypeName<dyn Variable>>,
 }
 
 /// Length of a window.
@@ -23,7 +23,7 @@ pub enum Span {
     /// Number of variables that stay: the newest ones, without the types that are kept.
     Poses(NonZeroUsize),
     /// Seconds for which a variable stays after it was pushed. The newest variable always stays. The current
-    /// time is the last [`Session::set_time`](crate::Session::set_time).
+    /// time is the last [`Smoother::set_time`](crate::Smoother::set_time).
     Seconds(Positive),
 }
 
@@ -31,18 +31,18 @@ pub enum Span {
 #[derive(Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Window")]
-struct Document {
+struct WindowDocument {
     /// Number of variables that stay, at least one: the newest ones, without the types of `keep`. Older ones
-    /// are marginalized at the end of an update, as by `Session::marginalize`. Either this or `seconds`.
+    /// are marginalized at the end of an update, as by `Smoother::marginalize`. Either this or `seconds`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     poses: Option<NonZeroUsize>,
-    /// Time for which a variable stays after it was pushed, by the clock of `Session::set_time`. The newest
+    /// Time for which a variable stays after it was pushed, by the clock of `Smoother::set_time`. The newest
     /// variable always stays. Either this or `poses`. Unit: seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     seconds: Option<Positive>,
     /// Names of types whose variables always stay, for example `"dual_quadric"`. Default: none.
     #[serde(default)]
-    keep: Vec<ManifoldType>,
+    keep: Vec<TypeName<dyn Variable>>,
 }
 
 /// A window with both `poses` and `seconds`, or with neither.
@@ -55,9 +55,9 @@ pub struct NotOneSpan {
     both: bool,
 }
 
-impl TryFrom<Document> for Window {
+impl TryFrom<WindowDocument> for Window {
     type Error = NotOneSpan;
-    fn try_from(Document { poses, seconds, keep }: Document) -> Result<Self, NotOneSpan> {
+    fn try_from(WindowDocument { poses, seconds, keep }: WindowDocument) -> Result<Self, NotOneSpan> {
         let span = match (poses, seconds) {
             (Some(poses), None) => Span::Poses(poses),
             (None, Some(seconds)) => Span::Seconds(seconds),
@@ -67,7 +67,7 @@ impl TryFrom<Document> for Window {
     }
 }
 
-impl From<Window> for Document {
+impl From<Window> for WindowDocument {
     fn from(Window { span, keep }: Window) -> Self {
         let (poses, seconds) = match span {
             Span::Poses(poses) => (Some(poses), None),
@@ -81,50 +81,5 @@ impl From<Span> for Window {
     /// Returns a window that keeps no type.
     fn from(span: Span) -> Self {
         Self { span, keep: vec![] }
-    }
-}
-
-/// The name of a registered type of variables.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "String", into = "String")]
-#[schemars(with = "String")]
-pub struct ManifoldType(String);
-
-/// A name that is not a registered type of variables.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown type of variables `{name}`: {}", advice(.name))]
-pub struct UnknownManifold {
-    name: String,
-}
-
-fn advice(name: &str) -> String {
-    let known: Vec<String> = catalogue::entries(KIND).iter().map(|entry| entry.name.to_owned()).collect();
-    let advice = manifactor_document::advice(name, &known);
-    advice.unwrap_or_else(|| "this program has none; link the crate that registers it".to_owned())
-}
-
-/// Name of the kind of variables in the catalogue.
-const KIND: &str = <dyn manifactor_graph::Variable as catalogue::Kind>::NAME;
-
-impl TryFrom<String> for ManifoldType {
-    type Error = UnknownManifold;
-    fn try_from(name: String) -> Result<Self, UnknownManifold> {
-        match catalogue::find(KIND, &name) {
-            Some(_) => Ok(Self(name)),
-            None => Err(UnknownManifold { name }),
-        }
-    }
-}
-
-impl From<ManifoldType> for String {
-    fn from(name: ManifoldType) -> Self {
-        name.0
-    }
-}
-
-impl ManifoldType {
-    /// Returns the name.
-    pub fn as_str(&self) -> &str {
-        &self.0
     }
 }

@@ -6,10 +6,10 @@ mod failures;
 mod history;
 mod idle;
 mod outliers;
-mod parking;
 mod saving;
 mod steps;
 #[path = "../../solve/tests/toy/mod.rs"]
 mod toy;
+mod undetermined;
 mod windows;
 mod world;

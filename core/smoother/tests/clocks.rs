@@ -4,30 +4,30 @@ use crate::toy::{At, Careless, Plane};
 use crate::windows::step;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Graph, Values};
-use manifactor_smoother::{ChangeError, LoadError, Session, Settings, Span, UpdateError, Window};
+use manifactor_smoother::{ChangeError, LoadError, Smoother, SmootherSettings, Span, UpdateError, Window};
 use std::num::NonZeroUsize;
 
 fn seconds(seconds: f64) -> Span {
     Span::Seconds(Positive::new(seconds).unwrap())
 }
 
-fn session(span: Span) -> Session {
-    Session::new(Settings { window: Some(span.into()), ..Settings::default() })
+fn smoother(span: Span) -> Smoother {
+    Smoother::new(SmootherSettings { window: Some(span.into()), ..SmootherSettings::default() })
 }
 
 /// Adds a pose at this time. Returns the marginalized poses.
-fn pose(session: &mut Session, i: usize, time: f64) -> Vec<String> {
-    session.set_time(time).unwrap();
+fn pose(smoother: &mut Smoother, i: usize, time: f64) -> Vec<String> {
+    smoother.set_time(time).unwrap();
     let (graph, values) = step(i);
-    session.push(&graph, &values).unwrap();
-    let report = session.update().unwrap();
-    report.sealed.iter().map(ToString::to_string).collect()
+    smoother.push(&graph, &values).unwrap();
+    let report = smoother.update().unwrap();
+    report.marginalized.iter().map(ToString::to_string).collect()
 }
 
 #[test]
 fn a_pose_each_second_is_as_in_a_window_by_poses() {
     let (mut by_seconds, mut by_poses) =
-        (session(seconds(4.5)), session(Span::Poses(NonZeroUsize::new(5).unwrap())));
+        (smoother(seconds(4.5)), smoother(Span::Poses(NonZeroUsize::new(5).unwrap())));
     for i in 0..40 {
         let leaving = pose(&mut by_seconds, i, 1e9 + i as f64);
         assert_eq!(leaving, pose(&mut by_poses, i, i as f64));
@@ -39,64 +39,64 @@ fn a_pose_each_second_is_as_in_a_window_by_poses() {
 
 #[test]
 fn stamps_may_be_uneven() {
-    let mut session = session(seconds(2.0));
+    let mut smoother = smoother(seconds(2.0));
     let none: [&str; 0] = [];
-    assert_eq!(pose(&mut session, 0, -1.0), none);
-    assert_eq!(pose(&mut session, 1, 0.5), none);
+    assert_eq!(pose(&mut smoother, 0, -1.0), none);
+    assert_eq!(pose(&mut smoother, 1, 0.5), none);
     // two poses at one time; a pose exactly as old as the window stays
-    assert_eq!(pose(&mut session, 2, 0.5), none);
-    assert_eq!(pose(&mut session, 3, 2.5), ["x0"]);
+    assert_eq!(pose(&mut smoother, 2, 0.5), none);
+    assert_eq!(pose(&mut smoother, 3, 2.5), ["x0"]);
     // no pose for a while: the newest stays, however old
-    session.set_time(100.0).unwrap();
-    let report = session.update().unwrap();
-    assert_eq!((report.sealed.len(), session.variables()), (2, 1));
-    session.set_time(200.0).unwrap();
-    assert!(session.update().unwrap().sealed.is_empty());
-    assert_eq!(pose(&mut session, 4, 200.0), ["x3"]);
-    assert!((session.get::<Plane>("x4").unwrap().x - 4.0).abs() < 1e-9);
+    smoother.set_time(100.0).unwrap();
+    let report = smoother.update().unwrap();
+    assert_eq!((report.marginalized.len(), smoother.variables()), (2, 1));
+    smoother.set_time(200.0).unwrap();
+    assert!(smoother.update().unwrap().marginalized.is_empty());
+    assert_eq!(pose(&mut smoother, 4, 200.0), ["x3"]);
+    assert!((smoother.get::<Plane>("x4").unwrap().x - 4.0).abs() < 1e-9);
 }
 
 #[test]
 fn a_variable_comes_when_it_is_pushed_not_when_it_is_taken_in() {
-    let mut session = session(seconds(2.0));
+    let mut smoother = smoother(seconds(2.0));
     for i in 0..4 {
-        session.set_time(2.0 * i as f64).unwrap();
+        smoother.set_time(2.0 * i as f64).unwrap();
         let (graph, values) = step(i);
-        session.push(&graph, &values).unwrap();
+        smoother.push(&graph, &values).unwrap();
     }
-    let report = session.update().unwrap();
-    assert_eq!(report.sealed, ["x0".into(), "x1".into()]);
+    let report = smoother.update().unwrap();
+    assert_eq!(report.marginalized, ["x0".into(), "x1".into()]);
 }
 
 #[test]
 fn time_does_not_go_back() {
-    let mut session = session(seconds(2.0));
+    let mut smoother = smoother(seconds(2.0));
     let (graph, values) = step(0);
-    let error = session.push(&graph, &values).unwrap_err();
+    let error = smoother.push(&graph, &values).unwrap_err();
     assert_eq!(error, ChangeError::NoTime);
     assert!(error.to_string().contains("`set_time`") && error.to_string().contains("`window.poses`"));
-    assert!(session.set_time(f64::NAN).unwrap_err().to_string().contains("expected a finite number"));
-    assert!(session.set_time(f64::INFINITY).is_err());
-    pose(&mut session, 0, 10.5);
-    let error = session.set_time(9.25).unwrap_err();
+    assert!(smoother.set_time(f64::NAN).unwrap_err().to_string().contains("expected a finite number"));
+    assert!(smoother.set_time(f64::INFINITY).is_err());
+    pose(&mut smoother, 0, 10.5);
+    let error = smoother.set_time(9.25).unwrap_err();
     assert_eq!(error, ChangeError::Time { time: 9.25, last: Some(10.5) });
     assert_eq!(
         error.to_string(),
         "time 9.25 s: expected a finite number, 10.5 s or later: the time that was set before"
     );
-    session.set_time(11.0).unwrap();
-    assert!(session.set_time(10.75).is_err(), "one that no update has seen yet counts too");
-    session.set_time(11.0).unwrap();
+    smoother.set_time(11.0).unwrap();
+    assert!(smoother.set_time(10.75).is_err(), "one that no update has seen yet counts too");
+    smoother.set_time(11.0).unwrap();
     // without a window, or with a window by poses, no time is needed
-    let mut other = Session::new(Settings::default());
+    let mut other = Smoother::new(SmootherSettings::default());
     other.push(&graph, &values).unwrap();
 }
 
 #[test]
 fn an_update_that_fails_takes_the_time_back() {
-    let [mut one, mut other] = [(); 2].map(|()| session(seconds(3.0)));
-    for session in [&mut one, &mut other] {
-        (0..6).for_each(|i| drop(pose(session, i, f64::from(i as u32))));
+    let [mut one, mut other] = [(); 2].map(|()| smoother(seconds(3.0)));
+    for smoother in [&mut one, &mut other] {
+        (0..6).for_each(|i| drop(pose(smoother, i, f64::from(i as u32))));
     }
     one.set_time(50.0).unwrap();
     let (mut graph, mut values) = (Graph::new(), Values::new());
@@ -112,33 +112,33 @@ fn an_update_that_fails_takes_the_time_back() {
 
 #[test]
 fn a_restart_keeps_the_times() {
-    let mut session = session(seconds(3.5));
-    let mut other: Option<Session> = None;
+    let mut smoother = smoother(seconds(3.5));
+    let mut other: Option<Smoother> = None;
     for i in 0..40 {
         let time = 1e9 + 0.37 * i as f64 + 0.2 * f64::sin(i as f64);
-        let leaving = pose(&mut session, i, time);
+        let leaving = pose(&mut smoother, i, time);
         if let Some(other) = &mut other {
             assert_eq!(pose(other, i, time), leaving);
-            assert_eq!(bits(&session), bits(other));
+            assert_eq!(bits(&smoother), bits(other));
         }
         if i == 17 {
-            let text = session.save().unwrap();
-            let mut loaded = Session::load(&text).unwrap();
+            let text = smoother.save().unwrap();
+            let mut loaded = Smoother::load(&text).unwrap();
             assert_eq!(loaded.save().unwrap(), text);
             assert!(matches!(loaded.set_time(0.0), Err(ChangeError::Time { last: Some(_), .. })));
             other = Some(loaded);
         }
     }
-    assert_eq!(other.unwrap().save().unwrap(), session.save().unwrap());
-    session.set_time(2e9).unwrap();
-    assert!(session.save().is_err(), "a time that no update has seen is a change");
+    assert_eq!(other.unwrap().save().unwrap(), smoother.save().unwrap());
+    smoother.set_time(2e9).unwrap();
+    assert!(smoother.save().is_err(), "a time that no update has seen is a change");
 }
 
 #[test]
 fn times_that_cannot_be_are_refused() {
-    let mut session = session(seconds(3.0));
-    (0..4).for_each(|i| drop(pose(&mut session, i, f64::from(i as u32))));
-    let text = session.save().unwrap();
+    let mut smoother = smoother(seconds(3.0));
+    (0..4).for_each(|i| drop(pose(&mut smoother, i, f64::from(i as u32))));
+    let text = smoother.save().unwrap();
     let json = text.split_once('\n').unwrap().1.trim_end();
     let bits = |times: &[f64]| times.iter().map(|t| t.to_bits().to_string()).collect::<Vec<_>>().join(",");
     let now = bits(&[3.0]);
@@ -152,8 +152,8 @@ fn times_that_cannot_be_are_refused() {
         format!("\"time\":null,\"times\":[{}]", bits(&[0.0, 1.0, 2.0, 3.0])),
         format!("\"time\":{},\"times\":[]", bits(&[f64::NAN])),
     ] {
-        let other = crate::saving::resealed(&json.replacen(&right, &wrong, 1));
-        assert_eq!(Session::load(&other).unwrap_err(), LoadError::Inconsistent("times"), "{wrong}");
+        let other = crate::saving::with_checksum(&json.replacen(&right, &wrong, 1));
+        assert_eq!(Smoother::load(&other).unwrap_err(), LoadError::Inconsistent("times"), "{wrong}");
     }
 }
 
@@ -176,16 +176,16 @@ fn a_window_is_either_by_poses_or_by_seconds() {
     complains("{\"minutes\": 1}", "unknown field `minutes`");
     complains(
         "{\"poses\": 7, \"keep\": [\"toy_spice\"]}",
-        "unknown type of variables `toy_spice`: did you mean `toy_space`?",
+        "there is no variable `toy_spice`: did you mean `toy_space`?",
     );
 }
 
 #[test]
 fn factors_alone_need_no_new_time() {
-    let mut session = session(seconds(3.0));
-    pose(&mut session, 0, 1.0);
+    let mut smoother = smoother(seconds(3.0));
+    pose(&mut smoother, 0, 1.0);
     let mut graph = Graph::new();
     graph.add(["x0"], At { at: [0.5, 0.0] });
-    session.push(&graph, &Values::new()).unwrap();
-    session.update().unwrap();
+    smoother.push(&graph, &Values::new()).unwrap();
+    smoother.update().unwrap();
 }

@@ -4,14 +4,14 @@ use crate::toy::{At, Careless, Plane};
 use crate::world::{Shadow, Space};
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Fixed, Graph, Noise, Values};
-use manifactor_smoother::{Report, Session, Settings};
+use manifactor_smoother::{Smoother, SmootherSettings, UpdateReport};
 use proptest::prelude::*;
 use std::num::NonZeroUsize;
 
 /// Pushes, removes, weights and holds, and then fails: by a residual that is not finite, or by a sum that
 /// overflows.
 fn fail(history: &mut History, n: usize, overflows: bool) {
-    let session = &mut history.session;
+    let smoother = &mut history.smoother;
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("new", Plane { x: -4.0, y: 1.0 });
     if n.is_multiple_of(3) {
@@ -26,19 +26,19 @@ fn fail(history: &mut History, n: usize, overflows: bool) {
         graph.add(["new"], Careless {});
     }
     for key in history.keys.iter().take(n % 5) {
-        allowed(session.fix(key, &Fixed::Whole(n.is_multiple_of(2))));
-        if key.as_str().starts_with('p') && session.estimate(key.as_str()).is_some() {
+        allowed(smoother.fix(key, &Fixed::Whole(n.is_multiple_of(2))));
+        if key.as_str().starts_with('p') && smoother.estimate(key.as_str()).is_some() {
             graph.add([key.clone(), "new".into()], crate::toy::Apart { by: [1.0, 0.0] });
         }
     }
-    session.push(&graph, &values).unwrap();
+    smoother.push(&graph, &values).unwrap();
     for id in history.ids.iter().skip(n % 7).take(n % 4) {
-        allowed(session.set_weight(*id, 0.5));
+        allowed(smoother.set_weight(*id, 0.5));
     }
     for id in history.ids.iter().skip(n % 3).step_by(3).take(n % 6) {
-        allowed(session.remove(&[*id]));
+        allowed(smoother.remove(&[*id]));
     }
-    session.update().unwrap_err();
+    smoother.update().unwrap_err();
 }
 
 proptest! {
@@ -54,27 +54,27 @@ proptest! {
         window in prop_oneof![Just(None), window().prop_map(Some)],
         outliers in outliers(),
     ) {
-        let settings = Settings { relinearize_every: every, budget, window, outliers, ..Settings::default() };
+        let settings = SmootherSettings { relinearize_every: every, budget, window, outliers, ..SmootherSettings::default() };
         let [mut one, mut other] = std::array::from_fn(|_| History::new(settings.clone()));
         for history in [&mut one, &mut other] {
             history.apply_all(&before);
             history.apply(&Change::Update);
         }
         fail(&mut one, n, overflows);
-        prop_assert_eq!(one.session.cost().to_bits(), other.session.cost().to_bits());
-        prop_assert_eq!(bits(&one.session), bits(&other.session));
-        let loaded = Session::load(&one.session.save().unwrap());
+        prop_assert_eq!(one.smoother.cost().to_bits(), other.smoother.cost().to_bits());
+        prop_assert_eq!(bits(&one.smoother), bits(&other.smoother));
+        let loaded = Smoother::load(&one.smoother.save().unwrap());
         prop_assert!(loaded.is_ok(), "{}", loaded.err().map(|error| error.to_string()).unwrap_or_default());
-        prop_assert_eq!(bits(&loaded.unwrap()), bits(&other.session));
+        prop_assert_eq!(bits(&loaded.unwrap()), bits(&other.smoother));
         for change in after.iter().chain(&[Change::Update]) {
             // ids continue after the ones of the failed update
             let [one, other] = [&mut one, &mut other].map(|history| {
-                history.apply(change).map(|report| Report { dropped: vec![], rejected: vec![], readmitted: vec![], ..report })
+                history.apply(change).map(|report| UpdateReport { dropped: vec![], rejected: vec![], readmitted: vec![], ..report })
             });
             prop_assert_eq!(one, other);
         }
-        prop_assert_eq!(bits(&one.session), bits(&other.session));
+        prop_assert_eq!(bits(&one.smoother), bits(&other.smoother));
         let keys = one.present();
-        prop_assert_eq!(one.session.covariance(&keys), other.session.covariance(&keys));
+        prop_assert_eq!(one.smoother.covariance(&keys), other.smoother.covariance(&keys));
     }
 }

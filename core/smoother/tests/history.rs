@@ -4,8 +4,10 @@ use crate::toy::{Apart, At, Centre, Distance, Plane};
 use crate::world::{Beyond, Near, Shadow, Space};
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::loss::Huber;
-use manifactor_graph::{Fixed, Graph, Key, Noise, Values, Variable};
-use manifactor_smoother::{ChangeError, FactorId, Outliers, Report, Session, Settings, Span, Window};
+use manifactor_graph::{Fixed, Graph, Key, Noise, TypeName, Values, Variable};
+use manifactor_smoother::{
+    ChangeError, FactorId, Outliers, Smoother, SmootherSettings, Span, UpdateReport, Window,
+};
 use manifactor_solve::{GaussNewton, Silent};
 use proptest::prelude::*;
 use std::num::NonZeroUsize;
@@ -18,7 +20,7 @@ pub(crate) enum Change {
     Triple(usize, usize, usize),
     Prior(usize),
     Remove(usize),
-    Weigh(usize, f64),
+    SetWeight(usize, f64),
     Replace(usize),
     Fix(usize, u32),
     Update,
@@ -33,7 +35,7 @@ pub(crate) fn change() -> impl Strategy<Value = Change> {
         1 => (n.clone(), n.clone(), n.clone()).prop_map(|(a, b, c)| Change::Triple(a, b, c)),
         2 => n.clone().prop_map(Change::Prior),
         2 => n.clone().prop_map(Change::Remove),
-        1 => (n.clone(), prop_oneof![Just(0.0), 0.1..3.0]).prop_map(|(f, w)| Change::Weigh(f, w)),
+        1 => (n.clone(), prop_oneof![Just(0.0), 0.1..3.0]).prop_map(|(f, w)| Change::SetWeight(f, w)),
         1 => n.clone().prop_map(Change::Replace),
         1 => (n, 0..8u32).prop_map(|(v, bits)| Change::Fix(v, bits)),
         4 => Just(Change::Update),
@@ -41,7 +43,7 @@ pub(crate) fn change() -> impl Strategy<Value = Change> {
 }
 
 pub(crate) fn window() -> impl Strategy<Value = Window> {
-    let keep = prop_oneof![Just(vec![]), Just(vec!["toy_space".to_owned().try_into().unwrap()])];
+    let keep = prop_oneof![Just(vec![]), Just(vec![TypeName::new("toy_space").unwrap()])];
     (1..6usize, keep)
         .prop_map(|(poses, keep)| Window { span: Span::Poses(NonZeroUsize::new(poses).unwrap()), keep })
 }
@@ -53,24 +55,26 @@ pub(crate) fn outliers() -> impl Strategy<Value = Option<Outliers>> {
 /// Accepts the rejection of a change to a marginalized variable or factor, and no other error.
 pub(crate) fn allowed<T: Default>(result: Result<T, ChangeError>) -> T {
     match result {
-        Err(ChangeError::Gone { .. } | ChangeError::GoneFactor { .. } | ChangeError::Sealed { .. }) => {
-            T::default()
-        }
+        Err(
+            ChangeError::Marginalized { .. }
+            | ChangeError::MarginalizedFactor { .. }
+            | ChangeError::FixedLinearization { .. },
+        ) => T::default(),
         result => result.unwrap(),
     }
 }
 
 /// A smoother with its keys and factor ids.
 pub(crate) struct History {
-    pub(crate) session: Session,
+    pub(crate) smoother: Smoother,
     pub(crate) keys: Vec<Key>,
     pub(crate) ids: Vec<FactorId>,
     count: usize,
 }
 
 impl History {
-    pub(crate) fn new(settings: Settings) -> Self {
-        Self { session: Session::new(settings), keys: vec![], ids: vec![], count: 0 }
+    pub(crate) fn new(settings: SmootherSettings) -> Self {
+        Self { smoother: Smoother::new(settings), keys: vec![], ids: vec![], count: 0 }
     }
 
     fn is_plane(&self, v: usize) -> bool {
@@ -84,7 +88,7 @@ impl History {
     }
 
     fn push(&mut self, graph: &Graph, values: &Values) {
-        self.ids.extend(allowed(self.session.push(graph, values)));
+        self.ids.extend(allowed(self.smoother.push(graph, values)));
     }
 
     fn variable(&mut self, is_plane: bool) {
@@ -121,21 +125,21 @@ impl History {
     }
 
     /// Returns this history with a different smoother.
-    pub(crate) fn with(&self, session: Session) -> Self {
-        Self { session, keys: self.keys.clone(), ids: self.ids.clone(), count: self.count }
+    pub(crate) fn with(&self, smoother: Smoother) -> Self {
+        Self { smoother, keys: self.keys.clone(), ids: self.ids.clone(), count: self.count }
     }
 
     /// Returns the keys of the present variables.
     pub(crate) fn present(&self) -> Vec<&str> {
-        self.keys.iter().map(Key::as_str).filter(|key| self.session.estimate(key).is_some()).collect()
+        self.keys.iter().map(Key::as_str).filter(|key| self.smoother.estimate(key).is_some()).collect()
     }
 
-    pub(crate) fn apply_all(&mut self, changes: &[Change]) -> Vec<Report> {
+    pub(crate) fn apply_all(&mut self, changes: &[Change]) -> Vec<UpdateReport> {
         changes.iter().filter_map(|change| self.apply(change)).collect()
     }
 
     /// Applies a change. Returns the report of an update.
-    pub(crate) fn apply(&mut self, change: &Change) -> Option<Report> {
+    pub(crate) fn apply(&mut self, change: &Change) -> Option<UpdateReport> {
         let (n, m) = (self.keys.len(), self.ids.len());
         match *change {
             Change::Plane => self.variable(true),
@@ -166,23 +170,25 @@ impl History {
             }
             Change::Remove(f) if m > 0 => {
                 let id = self.ids.swap_remove(f % m);
-                allowed(self.session.remove(&[id]));
+                allowed(self.smoother.remove(&[id]));
             }
-            Change::Weigh(f, weight) if m > 0 => allowed(self.session.set_weight(self.ids[f % m], weight)),
+            Change::SetWeight(f, weight) if m > 0 => {
+                allowed(self.smoother.set_weight(self.ids[f % m], weight))
+            }
             Change::Replace(f) if m > 0 => {
-                let mut entry = self.session.entry(self.ids[f % m])?.clone();
+                let mut entry = self.smoother.entry(self.ids[f % m])?.clone();
                 let observed = entry.factor.erased().signature().rows.unwrap();
                 entry.noise(Noise::sigmas(&vec![0.7; observed]).unwrap());
-                self.session.replace(self.ids[f % m], entry).unwrap();
+                self.smoother.replace(self.ids[f % m], entry).unwrap();
             }
             Change::Fix(v, bits) if n > 0 => {
                 let tangent = if self.is_plane(v % n) { &["x", "y"][..] } else { &["x", "y", "z"] };
                 let named = tangent.iter().enumerate().filter(|(d, _)| bits >> d & 1 == 1);
                 let names: Vec<String> = named.map(|(_, name)| (*name).to_owned()).collect();
                 let key = self.keys[v % n].clone();
-                allowed(self.session.fix(&key, &Fixed::Directions(names)));
+                allowed(self.smoother.fix(&key, &Fixed::Directions(names)));
             }
-            Change::Update => return Some(self.session.update().unwrap()),
+            Change::Update => return Some(self.smoother.update().unwrap()),
             _ => {}
         }
         None
@@ -190,13 +196,13 @@ impl History {
 }
 
 /// Returns the bits of all estimates.
-pub(crate) fn bits(session: &Session) -> Vec<(Key, Vec<u64>)> {
+pub(crate) fn bits(smoother: &Smoother) -> Vec<(Key, Vec<u64>)> {
     let numbers = |value: &dyn Variable| -> Vec<f64> {
         let (plane, space) = (Plane { x: 0.0, y: 0.0 }, Space { at: [0.0; 3] });
         plane.erased().local(value).or_else(|| space.erased().local(value)).unwrap()
     };
     let bits = |value| numbers(value).into_iter().map(f64::to_bits).collect();
-    session.estimates().iter().map(|(key, value)| (key.clone(), bits(value))).collect()
+    smoother.estimates().iter().map(|(key, value)| (key.clone(), bits(value))).collect()
 }
 
 fn difference(a: &Values, b: &Values) -> f64 {
@@ -207,13 +213,13 @@ fn difference(a: &Values, b: &Values) -> f64 {
 }
 
 /// Everything is relinearized, and every change is propagated: updates are Gauss-Newton steps.
-fn exact() -> Settings {
-    Settings {
+fn exact() -> SmootherSettings {
+    SmootherSettings {
         relinearize_every: NonZeroUsize::MIN,
-        bend: NotNegative::literal(0.0),
-        deviation: NotNegative::literal(0.0),
+        relinearization_threshold: NotNegative::literal(0.0),
+        wildfire_threshold: NotNegative::literal(0.0),
         passes: 0,
-        ..Settings::default()
+        ..SmootherSettings::default()
     }
 }
 
@@ -221,46 +227,46 @@ proptest! {
     #![proptest_config(ProptestConfig::default())]
     #[test]
     fn any_history_ends_where_a_fresh_build_does(changes in prop::collection::vec(change(), 1..60), outliers in outliers()) {
-        let mut history = History::new(Settings { outliers, ..exact() });
+        let mut history = History::new(SmootherSettings { outliers, ..exact() });
         history.apply_all(&changes);
-        let mut report = history.session.update().unwrap();
+        let mut report = history.smoother.update().unwrap();
         let mut quiet = 0;
         for _ in 0..20 {
-            report = history.session.update().unwrap();
+            report = history.smoother.update().unwrap();
             quiet = if report.damped + report.halved == 0 && !report.solved_batch { quiet + 1 } else { 0 };
         }
         // a few updates after the last change, no step is damped
-        prop_assume!(report.undetermined.is_empty() && quiet > 8);
-        let (graph, _) = history.session.graph();
-        let mut values = history.session.estimates();
-        for key in &report.parked {
+        prop_assume!(report.undetermined_directions.is_empty() && quiet > 8);
+        let (graph, _) = history.smoother.graph();
+        let mut values = history.smoother.estimates();
+        for key in &report.undetermined_variables {
             values.remove(key.as_str());
         }
         prop_assume!(!values.is_empty());
         // push the factors at once into a new smoother at the current estimate: both take equal steps from
         // there
-        let mut fresh = Session::new(exact());
+        let mut fresh = Smoother::new(exact());
         let ids = fresh.push(&graph, &values).unwrap();
-        for (id, old) in ids.iter().zip(history.session.graph().1) {
-            fresh.set_weight(*id, history.session.weight(old).unwrap()).unwrap();
+        for (id, old) in ids.iter().zip(history.smoother.graph().1) {
+            fresh.set_weight(*id, history.smoother.weight(old).unwrap()).unwrap();
         }
         let anew = fresh.update().unwrap();
-        prop_assert!(anew.undetermined.is_empty() && anew.parked.is_empty());
-        let last = history.session.update().unwrap();
+        prop_assert!(anew.undetermined_directions.is_empty() && anew.undetermined_variables.is_empty());
+        let last = history.smoother.update().unwrap();
         // rounding can decide whether a step is damped, or whether a factor at the limit fits
         prop_assume!(last.damped + last.halved + anew.damped + anew.halved == 0 && !last.solved_batch);
         prop_assume!(last.rejected.is_empty() && last.readmitted.is_empty());
-        let now = history.session.estimates();
+        let now = history.smoother.estimates();
         let apart = difference(&fresh.estimates(), &now);
         // Gauss-Newton may take long steps on ranges
         let far = 1.0 + difference(&values, &now);
         prop_assert!(apart < 1e-10 * far, "{apart} of {far}");
         // at a fixed point of Gauss-Newton, a batch solver does not move
-        if difference(&values, &now) < 1e-9 && let Ok(finished) = history.session.finish(&GaussNewton::default(), &mut Silent) {
+        if difference(&values, &now) < 1e-9 && let Ok(finished) = history.smoother.finish(&GaussNewton::default(), &mut Silent) {
             prop_assert!(difference(&now, &finished.values) < 1e-6);
         }
         let keys: Vec<&str> = values.iter().map(|(key, _)| key.as_str()).collect();
-        let (one, other) = (history.session.covariance(&keys).unwrap(), fresh.covariance(&keys).unwrap());
+        let (one, other) = (history.smoother.covariance(&keys).unwrap(), fresh.covariance(&keys).unwrap());
         prop_assert!((&one - &other).amax() <= 1e-10 * one.amax().max(1.0), "{}", (&one - &other).amax());
     }
 }

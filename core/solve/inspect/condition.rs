@@ -1,13 +1,13 @@
 //! Condition number of the linear system.
 use crate::inspect::null_space::name;
-use crate::inspect::{Factorized, Weak};
+use crate::inspect::{Factorized, WeakDirection};
 use crate::linear::system::{dot, norm};
 use crate::problem::Problem;
 
 /// Maximum number of steps of the power iteration and of the inverse power iteration.
-const STEPS: usize = 30;
+const MAX_STEPS: usize = 30;
 /// Relative change of an eigenvalue estimate below which an iteration stops.
-const SETTLED: f64 = 0.01;
+const EIGENVALUE_TOLERANCE: f64 = 0.01;
 
 impl Problem {
     /// Estimates the condition number of H = JᵀJ at the estimate, scaled to a unit diagonal. It is the
@@ -29,9 +29,9 @@ impl Factorized<'_> {
     }
 
     /// Returns the direction with the weakest constraint, and the condition number.
-    pub(crate) fn weakest(&mut self) -> Option<Weak> {
+    pub(crate) fn weakest(&mut self) -> Option<WeakDirection> {
         let (condition, v, diagonal) = self.extremes()?;
-        Some(Weak { condition, direction: name(&self.problem.model, &v, &diagonal) })
+        Some(WeakDirection { condition, direction: name(&self.problem.model, &v, &diagonal) })
     }
 
     /// Returns the condition number, the direction with the weakest constraint, and the diagonal of H.
@@ -67,13 +67,13 @@ fn dominant(n: usize, mut multiply: impl FnMut(&mut [f64])) -> (f64, Vec<f64>) {
     // a start vector with a component in every direction
     let mut x: Vec<f64> = (0..n).map(|i| ((i * 7919 % 104_729) as f64 + 1.0).sin()).collect();
     let (mut before, mut value) = (vec![], 0.0);
-    for _ in 0..STEPS {
+    for _ in 0..MAX_STEPS {
         let length = norm(&x);
         x.iter_mut().for_each(|x| *x /= length);
         before.clone_from(&x);
         multiply(&mut x);
         let next = dot(&before, &x);
-        let settled = (next - value).abs() <= SETTLED * next;
+        let settled = (next - value).abs() <= EIGENVALUE_TOLERANCE * next;
         value = next;
         if settled || !value.is_finite() {
             break;

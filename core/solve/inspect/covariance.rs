@@ -34,9 +34,9 @@ pub enum CovarianceError {
     Compile(#[from] CompileError),
 }
 
-/// Marginals are computed one by one if fewer than one variable in `FEW` is requested. Above that, the
-/// selected inverse is faster.
-const FEW: usize = 8;
+/// Marginals are computed one by one if fewer than one variable in `ONE_BY_ONE_DIVISOR` is requested. Above
+/// that, the selected inverse is faster.
+const ONE_BY_ONE_DIVISOR: usize = 8;
 
 /// Marginal covariance of one variable.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -64,8 +64,8 @@ impl Solution {
         if let Some(unknown) = keys.iter().find(|key| !self.values.contains(key)) {
             return Err(CovarianceError::Unknown((*unknown).to_owned()));
         }
-        let few = !keys.is_empty() && keys.len() * FEW < self.values.len();
-        let all = self.ask(graph, |problem| {
+        let few = !keys.is_empty() && keys.len() * ONE_BY_ONE_DIVISOR < self.values.len();
+        let all = self.query(graph, |problem| {
             let mut system = problem.factorized()?;
             match few {
                 true => keys.iter().map(|key| Ok((Key::from(*key), system.marginal(key)?))).collect(),
@@ -86,7 +86,7 @@ impl Solution {
     /// # Errors
     /// As [`Problem::leverages`], or if `graph` is not the solved graph.
     pub fn leverages(&self, graph: &Graph) -> Result<Vec<Vec<f64>>, CovarianceError> {
-        self.ask(graph, Problem::leverages)?
+        self.query(graph, Problem::leverages)?
     }
 }
 

@@ -10,10 +10,10 @@ use serde::Serialize;
 use std::borrow::Cow;
 
 /// Number of factors in the table of the worst.
-const WORST: usize = 10;
+const WORST_FACTORS: usize = 10;
 /// Above this number of variables, the linear system is not analysed, since that takes several
 /// factorizations.
-const LARGE: usize = 50_000;
+const MAX_ANALYSED_VARIABLES: usize = 50_000;
 
 /// Diagnosis after a solve.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -67,8 +67,8 @@ impl Solution {
             Err(CovarianceError::Indeterminate(open)) => (Some(open), None),
             Err(_) => (None, None),
         };
-        let is_small = self.values.len() <= LARGE;
-        let (undetermined, condition) = if is_small { self.ask(graph, look)? } else { (None, None) };
+        let is_small = self.values.len() <= MAX_ANALYSED_VARIABLES;
+        let (undetermined, condition) = if is_small { self.query(graph, look)? } else { (None, None) };
         let mut costly: Vec<_> = self.factors.iter().filter(|f| f.cost > 0.0).collect();
         costly.sort_by(|a, b| b.cost.total_cmp(&a.cost));
         let row = |(state, entry): (&FactorState, &FactorEntry)| FactorCost {
@@ -80,6 +80,6 @@ impl Solution {
             weight: state.weight,
         };
         let entries = costly.into_iter().filter_map(|f| Some((f, graph.factors().get(f.entry)?)));
-        Ok(Diagnosis { worst: entries.take(WORST).map(row).collect(), condition, undetermined })
+        Ok(Diagnosis { worst: entries.take(WORST_FACTORS).map(row).collect(), condition, undetermined })
     }
 }

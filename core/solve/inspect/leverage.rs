@@ -4,9 +4,9 @@ use crate::linear::system::NoFactor;
 use crate::problem::Problem;
 
 /// Damping, as a share of the diagonal of H.
-const SHIFT: f64 = 1e-11;
+const DAMPING_SHARE: f64 = 1e-11;
 /// Lower bound of diagonal entries for the damping, as a share of the largest entry.
-const FLOOR: f64 = 1e-9;
+const DIAGONAL_FLOOR: f64 = 1e-9;
 
 impl Problem {
     /// Returns the leverage of each row of each factor at the estimate, in the order of the graph. It is
@@ -20,9 +20,9 @@ impl Problem {
     pub fn leverages(&mut self) -> Result<Vec<Vec<f64>>, CovarianceError> {
         self.linearize_once();
         let out_of_memory = self.out_of_memory();
-        let floor = FLOOR * self.system.largest();
+        let floor = DIAGONAL_FLOOR * self.system.largest();
         // undetermined directions have zeros in J, so their leverage is zero, whatever their damping
-        let damping: Vec<f64> = self.system.diagonal().map(|d| SHIFT * d.max(floor)).collect();
+        let damping: Vec<f64> = self.system.diagonal().map(|d| DAMPING_SHARE * d.max(floor)).collect();
         match self.system.factorize_directly(Some(&damping)) {
             Ok(()) => {}
             Err(NoFactor::OutOfMemory) => return Err(out_of_memory),

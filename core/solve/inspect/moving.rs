@@ -1,12 +1,12 @@
 //! Variables that still move when a solve runs out of iterations.
 use crate::inspect::null_space::name;
-use crate::outcome::{Moving, Undetermined};
+use crate::outcome::{LargestMoves, Undetermined};
 use crate::problem::Problem;
 use manifactor_graph::column::Columns;
 
 impl Problem {
     /// Returns the step between the last trial and the estimate; `None` if they are equal.
-    pub(crate) fn moving(&self) -> Option<Moving> {
+    pub(crate) fn moving(&self) -> Option<LargestMoves> {
         let mut step = vec![0.0; self.dim()];
         for place in &self.model.variables {
             let value = |columns: &Columns| columns.column(place.column).get(place.index);
@@ -22,6 +22,6 @@ impl Problem {
         }
         let scale: Vec<f64> = self.system.diagonal().copied().collect();
         let Undetermined { keys, direction, moving } = name(&self.model, &step, &scale);
-        Some(Moving { keys, direction, moving })
+        Some(LargestMoves { keys, direction, moving })
     }
 }

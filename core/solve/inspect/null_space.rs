@@ -6,17 +6,17 @@ use crate::problem::{Model, Problem};
 use std::time::Instant;
 
 /// A pivot below this share of its diagonal entry triggers the search.
-const PIVOT: f64 = 1e-11;
+const SEARCH_PIVOT: f64 = 1e-11;
 /// A direction v of unit length in the metric of the diagonal is undetermined if ‖J v‖² is below this.
-const OPEN: f64 = 1e-15;
+const MAX_CURVATURE: f64 = 1e-15;
 /// A diagonal entry below this share of the largest is rounding error.
-const ROUNDING: f64 = 1e-24;
+const ROUNDING_SHARE: f64 = 1e-24;
 /// Lower bound of diagonal entries in that metric, as a share of the largest entry.
-const FLOOR: f64 = 1e-9;
+const DIAGONAL_FLOOR: f64 = 1e-9;
 /// Damping that makes the matrix positive definite for the search.
-const SHIFT: f64 = 1e-10;
+const SEARCH_DAMPING: f64 = 1e-10;
 /// Number of variables named in a report.
-const NAMED: usize = 3;
+const MAX_NAMED: usize = 3;
 
 /// Looks for an undetermined direction of the linearized problem. Searches only if the last factorization
 /// failed, or if a pivot is so small that it may come from rounding and damping alone. `damping` is a share
@@ -47,18 +47,18 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
     let largest = system.largest();
     if !failed {
         let mut suspicious = false;
-        let share = PIVOT.max(10.0 * damping);
+        let share = SEARCH_PIVOT.max(10.0 * damping);
         system.pivots(&mut |pivot, entry| {
             // a pivot that is NaN is suspicious too
-            suspicious |= pivot.is_nan() || pivot < share * entry || entry <= ROUNDING * largest;
+            suspicious |= pivot.is_nan() || pivot < share * entry || entry <= ROUNDING_SHARE * largest;
         });
         if !suspicious {
             return None;
         }
     }
-    let floor = if largest > 0.0 { FLOOR * largest } else { 1.0 };
+    let floor = if largest > 0.0 { DIAGONAL_FLOOR * largest } else { 1.0 };
     let scale: Vec<f64> = system.diagonal().map(|d| d.max(floor)).collect();
-    let shift: Vec<f64> = scale.iter().map(|d| SHIFT * d).collect();
+    let shift: Vec<f64> = scale.iter().map(|d| SEARCH_DAMPING * d).collect();
     system.factorize_directly(Some(&shift)).ok()?;
     // inverse iteration from a start vector with a component in every direction
     let mut v: Vec<f64> = (0..scale.len()).map(|i| ((i * 7919 % 104_729) as f64 + 1.0).sin()).collect();
@@ -79,7 +79,7 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
             bent += factor.blocks.iter().map(along).sum::<f64>().powi(2);
         }
     });
-    (bent < OPEN).then(|| name(model, &v, &scale))
+    (bent < MAX_CURVATURE).then(|| name(model, &v, &scale))
 }
 
 /// Describes a direction by variables and the names of their tangent directions.
@@ -95,7 +95,7 @@ pub(crate) fn name(model: &Model, v: &[f64], scale: &[f64]) -> Undetermined {
     moves.sort_by(|a, b| b.1.total_cmp(&a.1));
     let most = moves.first().map_or(0.0, |m| m.1);
     let moving = moves.iter().filter(|m| m.1 > 1e-3 * most).count();
-    moves.truncate(NAMED.min(moving));
+    moves.truncate(MAX_NAMED.min(moving));
     let mut direction = vec![];
     for (i, _) in &moves {
         let place = &model.variables[*i];

@@ -258,7 +258,7 @@ impl WithSimd for Factorize<'_> {
                 Some(part) => n = part.nodes.end - 1,
                 None => self.eliminate(simd, &structure.nodes[n])?,
             }
-            self.hand_on(n, part);
+            self.pass_update_on(n, part);
             n += 1;
         }
         Ok(())
@@ -335,7 +335,7 @@ impl Factorize<'_> {
     /// Adds the update of front `n`, or of `part`, to its parent if that is early. Otherwise the update
     /// stays on the stack.
     #[inline(always)]
-    fn hand_on(&mut self, n: usize, part: Option<&Part>) {
+    fn pass_update_on(&mut self, n: usize, part: Option<&Part>) {
         let structure = self.of.structure;
         let Workspace { updates: [even, odd], base, open, .. } = &mut *self.workspace;
         let (node, parent) = (&structure.nodes[n], structure.nodes[n].parent as usize);

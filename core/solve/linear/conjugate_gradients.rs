@@ -110,7 +110,7 @@ impl ConjugateGradients {
         let n = x.len();
         // the right-hand side of the complement: b_u − H_um H_mm⁻¹ b_m
         self.z.copy_from_slice(x);
-        keep(true, &self.is_eliminated, &mut self.z);
+        clear_other_part(true, &self.is_eliminated, &mut self.z);
         self.diagonal.solve(&mut self.z);
         system.multiply(&self.z, &mut self.q);
         for i in 0..n {
@@ -172,7 +172,7 @@ impl ConjugateGradients {
             return;
         }
         self.z.copy_from_slice(&self.q);
-        keep(true, &self.is_eliminated, &mut self.z);
+        clear_other_part(true, &self.is_eliminated, &mut self.z);
         self.diagonal.solve(&mut self.z);
         for coupling in &self.couplings {
             let (to, from) = (self.first[coupling.left], self.first[coupling.eliminated]);
@@ -182,7 +182,7 @@ impl ConjugateGradients {
                 }
             }
         }
-        keep(false, &self.is_eliminated, &mut self.q);
+        clear_other_part(false, &self.is_eliminated, &mut self.q);
     }
 
     /// Computes the block-Jacobi preconditioner; for blocks that remain after elimination, from the
@@ -228,6 +228,6 @@ impl ConjugateGradients {
 }
 
 /// Sets x to zero outside of the eliminated part, or outside of the remaining part.
-fn keep(eliminated: bool, is_eliminated: &[bool], x: &mut [f64]) {
+fn clear_other_part(eliminated: bool, is_eliminated: &[bool], x: &mut [f64]) {
     x.iter_mut().zip(is_eliminated).filter(|(_, e)| **e != eliminated).for_each(|(x, _)| *x = 0.0);
 }

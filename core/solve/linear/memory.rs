@@ -45,13 +45,13 @@ pub(crate) fn below_limit() -> u64 {
     const PROGRAM: u64 = 288 << 20;
     const THREAD: u64 = 128 << 20;
     // for work without large products
-    const LEAST: u64 = 4 << 20;
+    const MIN_BYTES: u64 = 4 << 20;
     let Some(limit) = memory_limit() else { return u64::MAX };
     // memory freed by earlier solves is still resident but available, so the resident size is read only
     // once
     static BEFORE: OnceLock<u64> = OnceLock::new();
     let taken = PROGRAM + THREAD * rayon::current_num_threads() as u64 + BEFORE.get_or_init(resident);
-    limit.saturating_sub(taken).max(LEAST)
+    limit.saturating_sub(taken).max(MIN_BYTES)
 }
 
 /// Returns the bytes below the limit for a factor, next to a compiled graph whose H has `entries` entries.

@@ -67,12 +67,12 @@ impl LinearSystem {
     }
 
     /// Takes the separate Cholesky factor, so that it survives a linearization.
-    pub(crate) fn take_direct(&mut self) -> Option<Cholesky> {
+    pub(crate) fn detach_direct(&mut self) -> Option<Cholesky> {
         self.direct.take()
     }
 
     /// Restores the separate Cholesky factor.
-    pub(crate) fn put_direct(&mut self, direct: Option<Cholesky>) {
+    pub(crate) fn restore_direct(&mut self, direct: Option<Cholesky>) {
         self.direct = direct;
     }
 

@@ -5,7 +5,7 @@ use std::fmt;
 
 /// The variables that the last step moved most, in the metric of the diagonal of H.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Moving {
+pub struct LargestMoves {
     /// Their keys, in descending order of motion.
     pub keys: Vec<Key>,
     /// Motion of each of these variables: name of the tangent direction, and its share.
@@ -14,7 +14,7 @@ pub struct Moving {
     pub moving: usize,
 }
 
-impl fmt::Display for Moving {
+impl fmt::Display for LargestMoves {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let parts: Vec<_> =
             self.direction.iter().map(|(key, name, x)| format!("{key}.{name} by {x:.2}")).collect();

@@ -1,5 +1,5 @@
 //! Terminations of a solve, and their reasons.
-use crate::outcome::Untouched;
+use crate::outcome::UnconstrainedVariables;
 use manifactor_graph::Key;
 use serde::Serialize;
 use std::fmt;
@@ -22,7 +22,7 @@ pub enum Termination {
         reason: Stall,
     },
     /// Some variables have no active factor; the remaining ones are at a minimum.
-    Indeterminate(Untouched),
+    Indeterminate(UnconstrainedVariables),
     /// A residual, a derivative or a step is not finite, at the current values or after every step.
     NonFinite {
         /// Index of the factor in the graph, from 0.

@@ -7,7 +7,7 @@ use std::any::type_name;
 /// The error for a factor that cannot be changed. The problem is unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum ChangeError {
+pub enum ProblemChangeError {
     /// The factor does not exist.
     #[error("there is no factor {factor}: the problem has {factors}, from 0")]
     NoFactor {
@@ -54,13 +54,13 @@ impl Problem {
     ///
     /// # Errors
     /// If there is no such factor, or it is not of type `R`.
-    pub fn factor_mut<R: Residual>(&mut self, factor: usize) -> Result<&mut R, ChangeError> {
+    pub fn factor_mut<R: Residual>(&mut self, factor: usize) -> Result<&mut R, ProblemChangeError> {
         let factors = self.factors();
         let Some(place) = self.model.factors.get(factor) else {
-            return Err(ChangeError::NoFactor { factor, factors });
+            return Err(ProblemChangeError::NoFactor { factor, factors });
         };
         let (batch, index, found) = (place.batch as usize, place.index as usize, place.name);
-        let of_another_type = ChangeError::Type { factor, found, expected: type_name::<R>() };
+        let of_another_type = ProblemChangeError::Type { factor, found, expected: type_name::<R>() };
         let residual = self.model.batches.get_mut(batch).and_then(|batch| batch.residual_mut(index));
         if residual.is_none_or(|residual| !residual.is::<R>()) {
             return Err(of_another_type);
@@ -74,17 +74,17 @@ impl Problem {
     ///
     /// # Errors
     /// If there is no such factor, or the noise does not fit it or is of a different kind than before.
-    pub fn set_noise(&mut self, factor: usize, noise: &Noise) -> Result<(), ChangeError> {
+    pub fn set_noise(&mut self, factor: usize, noise: &Noise) -> Result<(), ProblemChangeError> {
         let factors = self.factors();
         let Some(place) = self.model.factors.get(factor) else {
-            return Err(ChangeError::NoFactor { factor, factors });
+            return Err(ProblemChangeError::NoFactor { factor, factors });
         };
         let whitener = noise
             .whitener(place.all_rows as usize)
-            .map_err(|source| ChangeError::Noise { factor, source })?;
+            .map_err(|source| ProblemChangeError::Noise { factor, source })?;
         let (batch, index) = (place.batch as usize, place.index as usize);
         if !self.model.batches_mut()[batch].set_noise(index, &whitener) {
-            return Err(ChangeError::NoiseKind { factor });
+            return Err(ProblemChangeError::NoiseKind { factor });
         }
         self.model.factors[factor].observe(noise);
         self.version = Version::default();

@@ -6,7 +6,7 @@ use crate::linear::system::LinearSystem;
 use crate::outcome::Times;
 use crate::problem::Problem;
 use crate::problem::method::{self, Blocks};
-use crate::problem::model::{FactorPlace, Model, Place};
+use crate::problem::model::{Model, ProblemFactor, ProblemVariable};
 use manifactor_graph::batch::{Batch, Batches, Member};
 use manifactor_graph::column::{Columns, FIXED};
 use manifactor_graph::{Graph, GraphError, Key, Resolved, Values};
@@ -76,7 +76,7 @@ pub(crate) fn compile(
     let (mut variables, columns) = columns(graph, values);
 
     // the free variables are the blocks of the linear system
-    let is_free = |place: &Place| place.held.count_ones() < place.tangent.len() as u32;
+    let is_free = |place: &ProblemVariable| place.held.count_ones() < place.tangent.len() as u32;
     let free: Vec<usize> = (0..variables.len()).filter(|i| is_free(&variables[*i])).collect();
     if free.is_empty() {
         let why = if variables.is_empty() { "there are no values" } else { "all are held fixed" };
@@ -96,7 +96,7 @@ pub(crate) fn compile(
             pairs.extend(blocks[..n].iter().map(|&b| (a, b)));
         }
     }
-    let of_block: Vec<&Place> = free.iter().map(|v| &variables[*v]).collect();
+    let of_block: Vec<&ProblemVariable> = free.iter().map(|v| &variables[*v]).collect();
     let blocks = Blocks::new(&of_block, values);
     let order = method::order(linear, &blocks)?;
     let out_of_memory = CompileError::OutOfMemory { unknowns, needed: None, available: 0 };
@@ -132,9 +132,9 @@ pub(crate) fn compile(
 /// Rejects a graph that does not fit into memory, before allocating any of it.
 fn check_memory(graph: &Graph, values: &Values) -> Result<(), CompileError> {
     // below this number, the query of the available memory takes longer than the allocation
-    const FEW: usize = 100_000;
+    const UNCHECKED_FACTORS: usize = 100_000;
     let factors = graph.factors().len();
-    if factors < FEW && memory::memory_limit().is_none() {
+    if factors < UNCHECKED_FACTORS && memory::memory_limit().is_none() {
         return Ok(());
     }
     let (needed, available) = (memory::of_graph(graph, values), memory::available_memory());
@@ -145,7 +145,7 @@ fn check_memory(graph: &Graph, values: &Values) -> Result<(), CompileError> {
 }
 
 /// Sorts values into columns, by type.
-fn columns(graph: &Graph, values: &Values) -> (Vec<Place>, Columns) {
+fn columns(graph: &Graph, values: &Values) -> (Vec<ProblemVariable>, Columns) {
     let mut columns = Columns::default();
     let mut sizes: Vec<usize> = vec![];
     let place = |(key, value): (&Key, &dyn manifactor_graph::Variable)| {
@@ -159,7 +159,7 @@ fn columns(graph: &Graph, values: &Values) -> (Vec<Place>, Columns) {
         sizes[column] += 1;
         let tangent = erased.tangent();
         let held = graph.fixed().get(key).map_or(0, |f| f.bits(tangent));
-        Place { key: key.clone(), column, index: sizes[column] - 1, tangent, start: None, held }
+        ProblemVariable { key: key.clone(), column, index: sizes[column] - 1, tangent, start: None, held }
     };
     let variables = values.iter().map(place).collect();
     (variables, columns)
@@ -170,10 +170,10 @@ fn columns(graph: &Graph, values: &Values) -> (Vec<Place>, Columns) {
 fn batches(
     graph: &Graph,
     resolved: Vec<Resolved>,
-    variables: &[Place],
+    variables: &[ProblemVariable],
     block: &[Option<usize>],
     layout: &Layout,
-) -> (Vec<Box<dyn Batch>>, Vec<FactorPlace>) {
+) -> (Vec<Box<dyn Batch>>, Vec<ProblemFactor>) {
     let mut batches = Batches::default();
     // the batch of each factor, and for each batch the number of factors and of their variables, so that
     // memory is reserved only once
@@ -214,7 +214,7 @@ fn batches(
             factor: factor.factor.erased().as_any(),
             index: &index,
             starts: &starts,
-            held: &held,
+            fixed: &held,
             slots: &slots,
             whitener: &whitener,
             loss: factor.loss.as_deref(),
@@ -223,7 +223,7 @@ fn batches(
             (factor.factor.typetag_name(), factor.factor.erased().signature().rows.unwrap_or(0) as u32);
         let own_name = factor.name.clone();
         let mut place =
-            FactorPlace { variables: ids, name, own_name, all_rows, rows: all_rows, batch, index: at };
+            ProblemFactor { variables: ids, name, own_name, all_rows, rows: all_rows, batch, index: at };
         place.observe(&factor.noise);
         factors.push(place);
     }

@@ -52,7 +52,7 @@ impl Problem {
                 return Err(ValueError::Missing { key: key.clone() });
             }
         }
-        self.model.put(values);
+        self.model.set_values(values);
         Ok(())
     }
 
@@ -69,7 +69,7 @@ impl Problem {
         if let Some(factor) = weights.iter().position(bad) {
             return Err(WeightError::Domain { factor, weight: weights[factor] });
         }
-        self.model.weigh(weights);
+        self.model.set_weights(weights);
         Ok(())
     }
 }

@@ -4,12 +4,12 @@ use crate::linear::ordering::Order;
 use crate::linear::settings::{self as chosen, LinearSolver, Ordering, Preconditioner};
 use crate::linear::{Cholesky, ConjugateGradients, Method, Qr, memory};
 use crate::problem::CompileError;
-use crate::problem::model::Place;
+use crate::problem::model::ProblemVariable;
 use manifactor_graph::{Key, Values};
 use std::collections::HashMap;
 
 /// Systems with at most this number of unknowns are factorized as one dense matrix.
-const DENSE: usize = 24;
+const MAX_DENSE_UNKNOWNS: usize = 24;
 
 /// The blocks of a linear system, with their variables.
 pub(crate) struct Blocks<'a> {
@@ -21,7 +21,7 @@ pub(crate) struct Blocks<'a> {
 }
 
 impl<'a> Blocks<'a> {
-    pub(crate) fn new(places: &[&'a Place], values: &Values) -> Self {
+    pub(crate) fn new(places: &[&'a ProblemVariable], values: &Values) -> Self {
         let most = places.iter().map(|p| p.column + 1).max().unwrap_or(0);
         let mut names = vec![""; most];
         for place in places {
@@ -86,7 +86,7 @@ pub(crate) fn method(
         chosen::Method::Qr => return Ok(Method::Qr(Qr::default())),
         chosen::Method::ConjugateGradients => return iterative(linear, blocks, layout),
         chosen::Method::Dense => true,
-        chosen::Method::Auto => layout.dim() <= DENSE,
+        chosen::Method::Auto => layout.dim() <= MAX_DENSE_UNKNOWNS,
         chosen::Method::Cholesky => false,
     };
     let structure = layout.structure(dense);
@@ -105,10 +105,10 @@ pub(crate) fn method(
 /// Returns the bytes available for a factor. For a small factor, the query of the available memory would
 /// take longer than the allocation.
 fn available(linear: &LinearSolver, needed: u64, entries: usize) -> u64 {
-    const SMALL: u64 = 256 << 20;
+    const SMALL_FACTOR_BYTES: u64 = 256 << 20;
     match linear.memory_gib {
         Some(gib) => (*gib * f64::from(1 << 30)) as u64,
-        None if needed <= SMALL => SMALL.min(memory::beside(entries)),
+        None if needed <= SMALL_FACTOR_BYTES => SMALL_FACTOR_BYTES.min(memory::beside(entries)),
         None => memory::for_factor(entries),
     }
 }

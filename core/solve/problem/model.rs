@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// A variable in a problem.
 #[derive(Debug, Clone)]
-pub(crate) struct Place {
+pub(crate) struct ProblemVariable {
     pub key: Key,
     /// Its column, and its index in the column.
     pub column: usize,
@@ -20,7 +20,7 @@ pub(crate) struct Place {
     pub held: u32,
 }
 
-impl Place {
+impl ProblemVariable {
     /// Returns the scalar unknown of each tangent direction; `None` for a fixed one.
     pub(crate) fn unknowns(&self) -> impl Iterator<Item = Option<usize>> {
         let free = |d: usize| self.start.filter(|_| self.held >> d & 1 == 0).map(|start| start + d);
@@ -30,7 +30,7 @@ impl Place {
 
 /// A factor in a problem.
 #[derive(Debug, Clone)]
-pub(crate) struct FactorPlace {
+pub(crate) struct ProblemFactor {
     pub variables: VariableIndices,
     /// Name of its type, and its own name if it has one.
     pub name: &'static str,
@@ -43,7 +43,7 @@ pub(crate) struct FactorPlace {
     pub index: u32,
 }
 
-impl FactorPlace {
+impl ProblemFactor {
     /// Returns the label in reports.
     pub(crate) fn label(&self) -> Cow<'static, str> {
         self.own_name.as_ref().map_or(Cow::Borrowed(self.name), |name| Cow::Owned((**name).to_owned()))
@@ -56,8 +56,8 @@ impl FactorPlace {
 
 /// Variables in columns and factors in batches, by type.
 pub(crate) struct Model {
-    pub variables: Vec<Place>,
-    pub factors: Vec<FactorPlace>,
+    pub variables: Vec<ProblemVariable>,
+    pub factors: Vec<ProblemFactor>,
     /// The weight of each factor; empty if none was set.
     weights: Vec<f64>,
     /// The estimate, and memory for a trial step.
@@ -72,8 +72,8 @@ pub(crate) struct Model {
 
 impl Model {
     pub(crate) fn new(
-        variables: Vec<Place>,
-        factors: Vec<FactorPlace>,
+        variables: Vec<ProblemVariable>,
+        factors: Vec<ProblemFactor>,
         columns: Columns,
         starts: Vec<Vec<u32>>,
         batches: Vec<Box<dyn Batch>>,
@@ -100,7 +100,7 @@ impl Model {
         &self.trial
     }
 
-    pub(crate) fn place(&self, key: &str) -> Option<&Place> {
+    pub(crate) fn place(&self, key: &str) -> Option<&ProblemVariable> {
         self.variables.iter().find(|place| place.key.as_str() == key)
     }
 
@@ -122,7 +122,7 @@ impl Model {
     }
 
     /// Sets the estimate to values that are known to fit. Variables without a value keep theirs.
-    pub(crate) fn put(&mut self, values: &Values) {
+    pub(crate) fn set_values(&mut self, values: &Values) {
         self.revision += 1;
         for place in &self.variables {
             if let Some(value) = values.variable(place.key.as_str()) {
@@ -151,7 +151,7 @@ impl Model {
     }
 
     /// Sets weights that are known to fit. A factor without one gets weight 1.
-    pub(crate) fn weigh(&mut self, weights: &[f64]) {
+    pub(crate) fn set_weights(&mut self, weights: &[f64]) {
         self.revision += 1;
         self.weights.clear();
         self.weights.extend_from_slice(weights);
@@ -162,7 +162,7 @@ impl Model {
     /// Adds all factors to H and g, and decides which of them are active.
     pub(crate) fn linearize(&mut self, to: &mut NormalEquations<'_>) -> Evaluation {
         let columns = &self.columns;
-        self.batches.iter_mut().fold(Evaluation::default(), |total, b| total.and(b.linearize(columns, to)))
+        self.batches.iter_mut().fold(Evaluation::default(), |total, b| total.merge(b.linearize(columns, to)))
     }
 
     /// Evaluates the cost at the estimate, over the factors that were active at the last linearization.
@@ -171,7 +171,7 @@ impl Model {
     }
 
     fn cost_at(&self, columns: &Columns) -> Evaluation {
-        self.batches.iter().map(|b| b.cost(columns)).fold(Evaluation::default(), Evaluation::and)
+        self.batches.iter().map(|b| b.cost(columns)).fold(Evaluation::default(), Evaluation::merge)
     }
 
     /// Sets the trial to `estimate ⊞ step`.

@@ -48,17 +48,17 @@ pub struct Auto {
 }
 
 /// Damping of the first step, as a share of the diagonal: negligible.
-const DAMPING: Positive = Positive::literal(1e-10);
+const INITIAL_DAMPING: Positive = Positive::literal(1e-10);
 /// Standard deviation in metres or radians, with the noise scaled to fit the residuals. All directions with
 /// a smaller one are damped equally; the remaining ones are damped by the diagonal of H. With pure diagonal
 /// damping, steps would run off along weakly constrained directions and leave the domains of factors. An
 /// example is the size of an object seen from one side.
-const WEAK: f64 = 0.1;
+const WEAK_SIGMA: f64 = 0.1;
 /// Lower bound of the damping of a direction, as a share of the common damping.
-const LEAST: f64 = 1e-6;
+const MIN_DAMPING_SHARE: f64 = 1e-6;
 /// Lower bound of the common damping, as a share of the largest diagonal entry of H, however well the
 /// estimate fits.
-const FLOOR: f64 = 1e-12;
+const COMMON_DAMPING_FLOOR: f64 = 1e-12;
 
 #[typetag::serialize(name = "auto")]
 impl Optimizer for Auto {
@@ -67,7 +67,7 @@ impl Optimizer for Auto {
     }
 
     fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        self.damped(DAMPING, problem, observer)
+        self.damped(INITIAL_DAMPING, problem, observer)
     }
 
     fn solve(
@@ -82,7 +82,7 @@ impl Optimizer for Auto {
         if let (Some(Pause::Rise { step }), Termination::Interrupted) = (watch.pause, &outcome.termination)
             && !watch.stopped
         {
-            outcome = self.go_on(step, &mut problem, &mut watch, outcome);
+            outcome = self.continue_full_steps(step, &mut problem, &mut watch, outcome);
         }
         let is_over = match outcome.termination {
             _ if watch.stopped => true,
@@ -113,8 +113,9 @@ impl Auto {
         let rows: u32 = problem.model.factors.iter().map(|factor| factor.rows).sum();
         let bounds = |descent: &Descent<'_>| {
             let variance = 2.0 * descent.at.cost / f64::from(rows.max(1));
-            let most = (variance / WEAK.powi(2)).max(FLOOR * descent.problem.system.largest());
-            [LEAST * most, most]
+            let most =
+                (variance / WEAK_SIGMA.powi(2)).max(COMMON_DAMPING_FLOOR * descent.problem.system.largest());
+            [MIN_DAMPING_SHARE * most, most]
         };
         let damped =
             LevenbergMarquardt { initial_lambda, stop: self.stop.clone(), ..LevenbergMarquardt::default() };
@@ -128,7 +129,13 @@ impl Auto {
     /// Accepts a step of length `step` that raised the cost, and continues with full steps if the next one
     /// is much shorter. If weights span many orders of magnitude, even a good step may raise the cost.
     /// Restores the estimate if this leads to no minimum.
-    fn go_on(&self, step: f64, problem: &mut Problem, watch: &mut Watch<'_>, outcome: Outcome) -> Outcome {
+    fn continue_full_steps(
+        &self,
+        step: f64,
+        problem: &mut Problem,
+        watch: &mut Watch<'_>,
+        outcome: Outcome,
+    ) -> Outcome {
         let (before, pause) = (problem.model.columns().clone(), watch.pause);
         problem.model.accept();
         watch.expect_shorter_than(step);

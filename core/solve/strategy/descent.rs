@@ -19,7 +19,7 @@ const HISTORY: usize = 1000;
 
 /// A trial step with its prediction.
 #[derive(Debug, Clone, Default)]
-pub struct Step {
+pub struct TrialStep {
     /// δ, in the order of the linear system.
     pub delta: Vec<f64>,
     /// Decrease of ½ρ predicted by the quadratic model.
@@ -34,7 +34,7 @@ pub struct Step {
     pub damped: f64,
 }
 
-impl Step {
+impl TrialStep {
     /// Halves the step. The prediction stays.
     pub(crate) fn halve(&mut self) {
         self.delta.iter_mut().for_each(|d| *d *= 0.5);
@@ -46,7 +46,7 @@ impl Step {
 /// Result of a trial step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
-pub enum Tried {
+pub enum TrialResult {
     /// It lowered the cost.
     Lower {
         /// Decrease of the cost, as a share of the prediction: 1 if the cost is quadratic.
@@ -62,7 +62,7 @@ pub enum Tried {
 /// try it, then accept it or compute a different one.
 ///
 /// ```
-/// use manifactor_solve::{Descent, Observer, Outcome, Problem, Step, Stopping, Tried};
+/// use manifactor_solve::{Descent, Observer, Outcome, Problem, TrialStep, Stopping, TrialResult};
 ///
 /// /// Gauss-Newton, as long as the cost falls.
 /// fn descend(problem: &mut Problem, stop: &Stopping, observer: &mut dyn Observer) -> Outcome {
@@ -70,14 +70,14 @@ pub enum Tried {
 ///         Ok(descent) => descent,
 ///         Err(outcome) => return *outcome,
 ///     };
-///     let mut step = Step::default();
+///     let mut step = TrialStep::default();
 ///     loop {
 ///         if let Some(termination) = descent.next() {
 ///             return descent.end(termination);
 ///         }
-///         let lower = descent.undamped(&mut step) && matches!(descent.attempt(&step), Tried::Lower { .. });
+///         let lower = descent.undamped(&mut step) && matches!(descent.attempt(&step), TrialResult::Lower { .. });
 ///         descent.record(&step, lower);
-///         let ended = if lower { descent.take(&step) } else { Some(descent.stalled()) };
+///         let ended = if lower { descent.accept(&step) } else { Some(descent.stalled()) };
 ///         if let Some(termination) = ended {
 ///             return descent.end(termination);
 ///         }
@@ -144,10 +144,10 @@ impl<'a> Descent<'a> {
 
     /// Returns the termination for a linearization that is not finite, with the factor that causes it.
     fn not_finite(&self) -> Option<Termination> {
-        self.at.not_finite.map(|factor| self.blame(factor))
+        self.at.not_finite.map(|factor| self.name_not_finite(factor))
     }
 
-    fn blame(&self, factor: usize) -> Termination {
+    fn name_not_finite(&self, factor: usize) -> Termination {
         Termination::NonFinite { factor, keys: self.problem.model.keys(factor) }
     }
 
@@ -176,7 +176,7 @@ impl<'a> Descent<'a> {
 
     /// Computes the step (H + diag(damping)) δ = -g. Returns `false` if the matrix is not positive
     /// definite, δ is not finite, or an observer has interrupted the solve.
-    pub fn damped(&mut self, damping: &[f64], step: &mut Step) -> bool {
+    pub fn damped(&mut self, damping: &[f64], step: &mut TrialStep) -> bool {
         if !self.factorize(Some(damping)) || !self.newton_step(&mut step.delta) {
             return false;
         }
@@ -190,7 +190,7 @@ impl<'a> Descent<'a> {
 
     /// Computes the step H δ = -g; see [`damped`](Self::damped). The step does not move along undetermined
     /// directions.
-    pub fn undamped(&mut self, step: &mut Step) -> bool {
+    pub fn undamped(&mut self, step: &mut TrialStep) -> bool {
         if !self.factorize_undamped() || !self.newton_step(&mut step.delta) {
             return false;
         }
@@ -205,13 +205,13 @@ impl<'a> Descent<'a> {
     fn factorize(&mut self, damping: Option<&[f64]>) -> bool {
         self.is_refactorized = false;
         let Self { problem, observer, interrupted, .. } = self;
-        problem.factorize(damping, &mut || go_on(*observer, interrupted)).is_ok()
+        problem.factorize(damping, &mut || poll_observer(*observer, interrupted)).is_ok()
     }
 
     /// Computes the step of the last factorization. Returns whether it is finite and was not interrupted.
     fn newton_step(&mut self, delta: &mut Vec<f64>) -> bool {
         let Self { problem, observer, interrupted, .. } = self;
-        problem.newton_step(delta, &mut || go_on(*observer, interrupted));
+        problem.newton_step(delta, &mut || poll_observer(*observer, interrupted));
         let finite = delta.iter().all(|x| x.is_finite());
         if !finite {
             self.trial = Evaluation { cost: f64::NAN, ..Evaluation::default() };
@@ -273,18 +273,22 @@ impl<'a> Descent<'a> {
     }
 
     /// Evaluates the cost after a step. The estimate stays unchanged.
-    pub fn attempt(&mut self, step: &Step) -> Tried {
+    pub fn attempt(&mut self, step: &TrialStep) -> TrialResult {
         self.trial = self.problem.try_step(&step.delta);
         let trial = &self.trial;
-        if trial.left > 0 || trial.not_finite.is_some() || !trial.cost.is_finite() {
-            return Tried::Undefined;
+        if trial.became_undefined > 0 || trial.not_finite.is_some() || !trial.cost.is_finite() {
+            return TrialResult::Undefined;
         }
         let gain = (self.at.cost - trial.cost) / step.predicted;
-        if trial.cost < self.at.cost && gain > 0.0 { Tried::Lower { gain } } else { Tried::Higher }
+        if trial.cost < self.at.cost && gain > 0.0 {
+            TrialResult::Lower { gain }
+        } else {
+            TrialResult::Higher
+        }
     }
 
     /// Returns whether both the last trial and its model show no further decrease.
-    pub(crate) fn settled(&self, step: &Step) -> bool {
+    pub(crate) fn shows_no_decrease(&self, step: &TrialStep) -> bool {
         self.is_small(self.at.cost - self.trial.cost) && self.is_small(step.predicted) && !self.is_steep()
     }
 
@@ -305,13 +309,14 @@ impl<'a> Descent<'a> {
         /// At a minimum, the estimate has half as many correct digits as the cost: a cosine below this is
         /// rounding.
         const ORTHOGONAL: f64 = 1e-6;
-        let Evaluation { cost, left, not_finite, .. } = self.trial;
+        let Evaluation { cost, became_undefined, not_finite, .. } = self.trial;
         let reason = if self.interrupted {
             return Termination::Interrupted;
-        } else if left > 0 {
+        } else if became_undefined > 0 {
             Stall::Domain
         } else if !cost.is_finite() {
-            return self.blame(not_finite.unwrap_or_else(|| self.problem.model.not_finite_factor()));
+            return self
+                .name_not_finite(not_finite.unwrap_or_else(|| self.problem.model.not_finite_factor()));
         } else if cost - self.at.cost > ROUNDING * self.at.cost.abs() {
             Stall::Jump
         } else if self.largest_cosine() <= ORTHOGONAL {
@@ -323,7 +328,7 @@ impl<'a> Descent<'a> {
     }
 
     /// Accepts the last trial step, and linearizes there. Returns a reason to stop, if there is one.
-    pub fn take(&mut self, step: &Step) -> Option<Termination> {
+    pub fn accept(&mut self, step: &TrialStep) -> Option<Termination> {
         self.problem.model.accept();
         let (before, after) = (self.at.cost, self.trial.cost);
         let inactive = self.at.inactive;
@@ -348,7 +353,7 @@ impl<'a> Descent<'a> {
 }
 
 /// Polls the observer. Returns whether the step may continue.
-fn go_on(observer: &mut dyn Observer, interrupted: &mut bool) -> bool {
+fn poll_observer(observer: &mut dyn Observer, interrupted: &mut bool) -> bool {
     *interrupted |= observer.poll().is_break();
     !*interrupted
 }

@@ -5,7 +5,7 @@ use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::outcome::{Stall, Termination, Tolerance};
 use crate::problem::Problem;
-use crate::strategy::descent::{Descent, Step, Tried};
+use crate::strategy::descent::{Descent, TrialResult, TrialStep};
 use crate::strategy::optimizer::{Optimizer, Stopping};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::register;
@@ -36,7 +36,7 @@ pub struct Dogleg {
 }
 
 /// A step is accepted if it reaches this share of the predicted decrease.
-const GAIN: f64 = 1e-4;
+const MIN_GAIN: f64 = 1e-4;
 
 #[typetag::serialize(name = "dogleg")]
 impl Optimizer for Dogleg {
@@ -55,7 +55,7 @@ impl Optimizer for Dogleg {
                 break termination;
             }
         };
-        let open = descent.open_direction();
+        let open = descent.undetermined_direction();
         descent.account(termination, open)
     }
 }
@@ -112,7 +112,7 @@ impl Path {
 impl Dogleg {
     fn iterate(&self, descent: &mut Descent<'_>) -> Termination {
         let mut radius = self.initial_radius.map(Positive::get);
-        let mut newton = Step::default();
+        let mut newton = TrialStep::default();
         'linearized: loop {
             if let Some(termination) = descent.next() {
                 return termination;
@@ -131,22 +131,28 @@ impl Dogleg {
                 let delta = path.point(within);
                 let (g, length) = (dot(&delta, descent.gradient()), path.length(&delta));
                 let predicted = -g - 0.5 * dot(&delta, &descent.problem.system.multiply(&delta));
-                let step = Step { predicted, norm: norm(&delta), control: within, delta, ..Step::default() };
+                let step = TrialStep {
+                    predicted,
+                    norm: norm(&delta),
+                    control: within,
+                    delta,
+                    ..TrialStep::default()
+                };
                 let tried = descent.attempt(&step);
-                let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
+                let accepted = matches!(tried, TrialResult::Lower { gain } if gain > MIN_GAIN);
                 descent.record(&step, accepted);
-                if let (true, Tried::Lower { gain }) = (accepted, &tried) {
+                if let (true, TrialResult::Lower { gain }) = (accepted, &tried) {
                     radius = Some(match *gain {
                         gain if gain > 0.75 => within.max(3.0 * length),
                         gain if gain < 0.25 => 0.5 * within,
                         _ => within,
                     });
-                    match descent.take(&step) {
+                    match descent.accept(&step) {
                         Some(termination) if !is_cut => return termination,
                         _ => continue 'linearized,
                     }
                 }
-                if !is_cut && !matches!(tried, Tried::Undefined) && descent.settled(&step) {
+                if !is_cut && !matches!(tried, TrialResult::Undefined) && descent.shows_no_decrease(&step) {
                     return Termination::Converged { reason: Tolerance::RelativeCost };
                 }
                 if step.norm <= *descent.stop.step {

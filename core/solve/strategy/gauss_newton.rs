@@ -4,7 +4,7 @@ use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::outcome::{Stall, Termination};
 use crate::problem::Problem;
-use crate::strategy::descent::{Best, Descent, Step, Tried};
+use crate::strategy::descent::{Best, Descent, TrialResult, TrialStep};
 use crate::strategy::optimizer::{Optimizer, Stopping};
 use manifactor_graph::register;
 use schemars::JsonSchema;
@@ -29,9 +29,9 @@ pub struct GaussNewton {
 }
 
 /// Consecutive rises of the cost that end a solve.
-const RISES: usize = 5;
+const MAX_RISES: usize = 5;
 /// Maximum number of halvings of one step.
-const HALVINGS: usize = 30;
+const MAX_HALVINGS: usize = 30;
 
 #[typetag::serialize(name = "gauss_newton")]
 impl Optimizer for GaussNewton {
@@ -53,14 +53,14 @@ impl Optimizer for GaussNewton {
             }
             best = Best::new(&descent);
         };
-        let open = descent.open_direction();
+        let open = descent.undetermined_direction();
         descent.account(termination, open)
     }
 }
 register!(dyn Optimizer, "gauss_newton", GaussNewton);
 
 fn iterate(descent: &mut Descent<'_>, best: &mut Best) -> Termination {
-    let mut step = Step::default();
+    let mut step = TrialStep::default();
     let mut rises = 0;
     loop {
         if let Some(termination) = descent.next() {
@@ -71,27 +71,31 @@ fn iterate(descent: &mut Descent<'_>, best: &mut Best) -> Termination {
         }
         step.control = 1.0;
         let mut halvings = 0;
-        while let Tried::Undefined = descent.attempt(&step) {
+        while let TrialResult::Undefined = descent.attempt(&step) {
             descent.record(&step, false);
             halvings += 1;
             if descent.interrupted() {
                 return Termination::Interrupted;
             }
-            if halvings > HALVINGS {
+            if halvings > MAX_HALVINGS {
                 return descent.stalled_by(Stall::Domain);
             }
             step.halve();
         }
-        rises = if descent.trial.cost > descent.at.cost && !descent.settled(&step) { rises + 1 } else { 0 };
+        rises = if descent.trial.cost > descent.at.cost && !descent.shows_no_decrease(&step) {
+            rises + 1
+        } else {
+            0
+        };
         descent.record(&step, true);
         // a step that is small because of halvings does not show convergence
         let is_cut = halvings > 0 && !descent.is_small(step.predicted);
-        match descent.take(&step) {
+        match descent.accept(&step) {
             Some(termination) if !is_cut => return termination,
             _ => {}
         }
         best.update(descent);
-        if rises >= RISES {
+        if rises >= MAX_RISES {
             return Termination::Stalled { reason: Stall::Diverging };
         }
     }

@@ -4,12 +4,12 @@ use crate::linear::settings::LinearSolver;
 use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::problem::CompileError;
-use crate::problem::{FactorPlace, Problem};
+use crate::problem::{Problem, ProblemFactor};
 use crate::strategy::auto::Auto;
 use crate::strategy::optimizer::Optimizer;
 use graduation::Graduation;
 use manifactor_graph::checked::Positive;
-use manifactor_graph::{Graph, Values, register};
+use manifactor_graph::{Factor, Graph, TypeName, Values, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -19,7 +19,7 @@ mod graduation;
 mod parameters;
 mod surrogate;
 
-pub use candidates::{Candidates, FactorType, UnknownFactor, is_sequential};
+pub use candidates::Candidates;
 pub use parameters::{Growth, Probability};
 pub use surrogate::Truncation;
 
@@ -53,7 +53,7 @@ pub struct Gnc {
     pub candidates: Candidates,
     /// Restricts the candidates to these factor types. Default: no restriction.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub types: Vec<FactorType>,
+    pub types: Vec<TypeName<dyn Factor>>,
     /// Factors that are always trusted, by index in the graph, from 0.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub inliers: Vec<usize>,
@@ -120,7 +120,7 @@ impl Gnc {
             *quantiles[rows]
                 .get_or_insert_with(|| 0.5 * square.unwrap_or_else(|| self.probability.chi_squared(rows)))
         };
-        let one = |(may, factor): (bool, &FactorPlace)| {
+        let one = |(may, factor): (bool, &ProblemFactor)| {
             let candidate = may && named(factor.name) && factor.rows > 0;
             candidate.then(|| bound(factor.rows as usize))
         };

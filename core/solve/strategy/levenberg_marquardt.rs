@@ -5,7 +5,7 @@ use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::outcome::{Termination, Tolerance};
 use crate::problem::Problem;
-use crate::strategy::descent::{Descent, Step, Tried};
+use crate::strategy::descent::{Descent, TrialResult, TrialStep};
 use crate::strategy::optimizer::{Optimizer, Stopping};
 use manifactor_graph::checked::{OneOrMore, Positive};
 use manifactor_graph::register;
@@ -87,25 +87,25 @@ impl DiagonalLimits {
 }
 
 /// A step is accepted if it reaches this share of the predicted decrease.
-const GAIN: f64 = 1e-4;
+const MIN_GAIN: f64 = 1e-4;
 /// Minimum λ after a rejected step, because a smaller λ changes the step by almost nothing.
-const NEGLIGIBLE: f64 = 1e-3;
+const MIN_RAISED_LAMBDA: f64 = 1e-3;
 /// λ above which a small step alone does not indicate a minimum.
-const TRUSTED: f64 = 1.0;
+const MAX_TRUSTED_LAMBDA: f64 = 1.0;
 /// Share of the slope due to damping above which damping holds the step back. With bounds, the damping
 /// diagonal may far exceed that of H.
-const HELD: f64 = 0.5;
+const HELD_BACK_SHARE: f64 = 0.5;
 /// A step that damping holds back does not end the solve if an undamped step predicts a decrease above this
 /// share of the cost. Smaller decreases come from nearly undetermined directions, along which the steps
 /// would never end.
-const MUCH: f64 = 1e-3;
+const HELD_BACK_DECREASE: f64 = 1e-3;
 /// Share of the slope due to damping above which damping may hold back a step in one of many directions,
-/// such as a landmark along its ray. The limit for the predicted decrease is then `MOST`, because an
-/// undamped step may diverge in the remaining directions.
-const TOUCHED: f64 = 1e-6;
-const MOST: f64 = 0.5;
+/// such as a landmark along its ray. The limit for the predicted decrease is then
+/// `SLIGHTLY_HELD_BACK_DECREASE`, because an undamped step may diverge in the remaining directions.
+const SLIGHTLY_HELD_BACK_SHARE: f64 = 1e-6;
+const SLIGHTLY_HELD_BACK_DECREASE: f64 = 0.5;
 /// λ up to which one small step means convergence; above, two in a row are required.
-const LIGHT: f64 = 1e-2;
+const MAX_LIGHT_LAMBDA: f64 = 1e-2;
 
 #[typetag::serialize(name = "levenberg_marquardt")]
 impl Optimizer for LevenbergMarquardt {
@@ -156,7 +156,7 @@ impl LevenbergMarquardt {
 
     fn iterate(&self, descent: &mut Descent<'_>, lambda: &mut f64, bounds: Bounds<'_>) -> Termination {
         let (mut rise, mut small_before) = (2.0, false);
-        let (mut step, mut damping) = (Step::default(), vec![]);
+        let (mut step, mut damping) = (TrialStep::default(), vec![]);
         'linearized: loop {
             if let Some(termination) = descent.next() {
                 return termination;
@@ -167,26 +167,30 @@ impl LevenbergMarquardt {
                 damping.extend(descent.problem.system.diagonal().map(|d| *lambda * d.max(least).min(most)));
                 step.control = *lambda;
                 if descent.damped(&damping, &mut step) {
-                    let is_trusted = step.control <= TRUSTED;
+                    let is_trusted = step.control <= MAX_TRUSTED_LAMBDA;
                     let doubt = match step.damped {
-                        damped if damped > HELD => Some(MUCH),
-                        damped if damped > TOUCHED => Some(MOST),
+                        damped if damped > HELD_BACK_SHARE => Some(HELD_BACK_DECREASE),
+                        damped if damped > SLIGHTLY_HELD_BACK_SHARE => Some(SLIGHTLY_HELD_BACK_DECREASE),
                         _ => None,
                     };
                     let tried = descent.attempt(&step);
-                    let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
+                    let accepted = matches!(tried, TrialResult::Lower { gain } if gain > MIN_GAIN);
                     descent.record(&step, accepted);
-                    if let (true, Tried::Lower { gain }) = (accepted, &tried) {
+                    if let (true, TrialResult::Lower { gain }) = (accepted, &tried) {
                         let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / *self.decrease).min(1.0);
                         (*lambda, rise) = ((*lambda * fall).max(*self.min_lambda), 2.0);
-                        let ended = descent.take(&step);
+                        let ended = descent.accept(&step);
                         // a step that is small because of damping does not show convergence
                         let small = ended.is_some() && is_trusted;
                         match ended {
-                            Some(_) if doubt.is_some_and(|share| descent.promises(&mut step, share)) => {
+                            Some(_)
+                                if doubt.is_some_and(|share| descent.predicts_decrease(&mut step, share)) =>
+                            {
                                 small_before = false;
                             }
-                            Some(termination) if small && (small_before || step.control <= LIGHT) => {
+                            Some(termination)
+                                if small && (small_before || step.control <= MAX_LIGHT_LAMBDA) =>
+                            {
                                 return termination;
                             }
                             Some(termination) if !is_trusted && descent.is_at_rest(&mut step) => {
@@ -196,15 +200,16 @@ impl LevenbergMarquardt {
                         }
                         continue 'linearized;
                     }
-                    let reason = if !matches!(tried, Tried::Undefined) && descent.settled(&step) {
-                        Some(Tolerance::RelativeCost)
-                    } else if step.norm <= *descent.stop.step && !descent.is_steep() {
-                        Some(Tolerance::Step)
-                    } else {
-                        None
-                    };
+                    let reason =
+                        if !matches!(tried, TrialResult::Undefined) && descent.shows_no_decrease(&step) {
+                            Some(Tolerance::RelativeCost)
+                        } else if step.norm <= *descent.stop.step && !descent.is_steep() {
+                            Some(Tolerance::Step)
+                        } else {
+                            None
+                        };
                     if let Some(reason) = reason.filter(|_| is_trusted)
-                        && !doubt.is_some_and(|share| descent.promises(&mut step, share))
+                        && !doubt.is_some_and(|share| descent.predicts_decrease(&mut step, share))
                     {
                         return Termination::Converged { reason };
                     }
@@ -212,7 +217,7 @@ impl LevenbergMarquardt {
                 if descent.interrupted() {
                     return Termination::Interrupted;
                 }
-                (*lambda, rise) = ((*lambda * rise).max(NEGLIGIBLE), rise * 2.0);
+                (*lambda, rise) = ((*lambda * rise).max(MIN_RAISED_LAMBDA), rise * 2.0);
                 if *lambda > *self.max_lambda {
                     return match descent.is_at_rest(&mut step) {
                         true => Termination::Converged { reason: Tolerance::RelativeCost },

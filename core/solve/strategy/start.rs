@@ -78,16 +78,16 @@ pub enum StartError {
 /// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Given {}
+pub struct GivenStart {}
 
-impl Given {
+impl GivenStart {
     pub(crate) const NAME: &'static str = "given";
 }
 
 #[typetag::serialize(name = "given")]
-impl Start for Given {
+impl Start for GivenStart {
     fn start(&self, _: &Graph, values: &Values) -> Result<Values, StartError> {
         Ok(values.clone())
     }
 }
-register!(dyn Start, "given", Given);
+register!(dyn Start, "given", GivenStart);

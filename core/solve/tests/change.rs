@@ -1,7 +1,7 @@
 //! Measurements and noise of a compiled problem, changed in place.
 use crate::toy::*;
 use manifactor_graph::{Graph, Noise, Values};
-use manifactor_solve::{ChangeError, GaussNewton, Optimizer, Problem, Silent};
+use manifactor_solve::{GaussNewton, Optimizer, Problem, ProblemChangeError, Silent};
 
 fn tracked() -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
@@ -44,12 +44,15 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
     let (graph, values) = tracked();
     let mut problem = Problem::compile(&graph, &values).unwrap();
     let before = problem.linearize();
-    assert_eq!(problem.factor_mut::<At>(2).unwrap_err(), ChangeError::NoFactor { factor: 2, factors: 2 });
+    assert_eq!(
+        problem.factor_mut::<At>(2).unwrap_err(),
+        ProblemChangeError::NoFactor { factor: 2, factors: 2 }
+    );
     let wrong = problem.factor_mut::<Apart>(0).unwrap_err().to_string();
     assert!(wrong.contains("factor 0 is a ") && wrong.contains("Apart"), "{wrong}");
     let kind = problem.set_noise(0, &Noise::unit()).unwrap_err();
-    assert_eq!(kind, ChangeError::NoiseKind { factor: 0 });
+    assert_eq!(kind, ProblemChangeError::NoiseKind { factor: 0 });
     let rows = problem.set_noise(0, &Noise::sigmas(&[1.0, 1.0, 1.0]).unwrap()).unwrap_err();
-    assert!(matches!(rows, ChangeError::Noise { factor: 0, .. }), "{rows}");
+    assert!(matches!(rows, ProblemChangeError::Noise { factor: 0, .. }), "{rows}");
     assert_eq!(problem.linearize(), before);
 }

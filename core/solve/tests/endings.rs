@@ -109,8 +109,8 @@ fn what_is_defined_nowhere_is_not_converged() {
     graph.add(["p"], Logarithm { to: 1.0 });
     graph.add(["p"], Logarithm { to: 2.0 });
     for (name, Solution { outcome, .. }) in solutions(&graph, &values) {
-        let untouched = outcome.untouched.as_ref().unwrap();
-        assert_eq!((untouched.active, untouched.factors, outcome.inactive), (0, 2, 2), "{name}");
+        let unconstrained = outcome.unconstrained.as_ref().unwrap();
+        assert_eq!((unconstrained.active, unconstrained.factors, outcome.inactive), (0, 2, 2), "{name}");
         assert!(outcome.termination.to_string().contains("(2 of 2 take no part at these values)"), "{name}");
     }
 }
@@ -121,10 +121,10 @@ fn a_variable_without_a_factor_that_takes_part_is_named() {
     graph.add(["p"], At { at: [2.0, 3.0] });
     graph.add(["behind"], Logarithm { to: 1.0 });
     for (name, Solution { outcome, values, .. }) in solutions(&graph, &values) {
-        let Termination::Indeterminate(untouched) = &outcome.termination else {
+        let Termination::Indeterminate(unconstrained) = &outcome.termination else {
             panic!("{name}: {outcome:?}")
         };
-        assert_eq!(untouched.keys, ["loose".into(), "behind".into()], "{name}");
+        assert_eq!(unconstrained.keys, ["loose".into(), "behind".into()], "{name}");
         let inactive = &outcome.inactive_factors;
         assert_eq!(
             (inactive[0].factor, &*inactive[0].name, inactive.len()),
@@ -144,7 +144,7 @@ fn a_variable_that_is_held_needs_no_factor() {
     graph.add(["p"], At { at: [2.0, 3.0] });
     graph.fix("held");
     for (name, Solution { outcome, .. }) in solutions(&graph, &values) {
-        assert!(outcome.termination.is_converged() && outcome.untouched.is_none(), "{name} {outcome:?}");
+        assert!(outcome.termination.is_converged() && outcome.unconstrained.is_none(), "{name} {outcome:?}");
     }
 }
 
@@ -156,8 +156,8 @@ fn a_factor_of_weight_zero_takes_no_part() {
     let mut problem = manifactor_solve::Problem::compile(&graph, &values).unwrap();
     problem.set_weights(&[1.0, 0.0]).unwrap();
     let outcome = solver("levenberg_marquardt", "auto").descend(&mut problem, &mut Silent);
-    let Termination::Indeterminate(untouched) = outcome.termination else { panic!("{outcome:?}") };
-    assert_eq!((untouched.keys, untouched.active), (vec!["q".into()], 1));
+    let Termination::Indeterminate(unconstrained) = outcome.termination else { panic!("{outcome:?}") };
+    assert_eq!((unconstrained.keys, unconstrained.active), (vec!["q".into()], 1));
 }
 
 #[test]

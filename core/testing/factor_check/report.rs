@@ -113,7 +113,7 @@ impl FactorReport {
 }
 
 /// Kinks, or jumps, with common rows.
-pub(super) struct Met {
+pub(super) struct KinkGroup {
     /// Variable, direction and row of each entry.
     entries: BTreeSet<(usize, usize, usize)>,
     largest: Kink,
@@ -121,7 +121,7 @@ pub(super) struct Met {
     at: Value,
 }
 
-impl Met {
+impl KinkGroup {
     fn size(kink: &Kink) -> (f64, f64) {
         (kink.jump, kink.size())
     }
@@ -149,7 +149,7 @@ pub(super) struct Gathered {
     pub defined: usize,
     pub singular: usize,
     pub worst: Option<NamedEntry>,
-    pub kinks: Vec<Met>,
+    pub kinks: Vec<KinkGroup>,
     pub unchanged: Vec<Unchanged>,
     pub linearizations: Vec<Linearization>,
     pub freedom: Option<Freedom>,
@@ -186,20 +186,22 @@ impl Gathered {
     pub(super) fn kinks(&mut self, subject: &Subject, kinks: &[Kink], drawn: &Drawn) {
         let (jumps, kinks): (Vec<&Kink>, Vec<&Kink>) = kinks.iter().partition(|kink| kink.jump != 0.0);
         for kinks in [jumps, kinks] {
-            let by_size =
-                |a: &&&Kink, b: &&&Kink| Met::size(a).partial_cmp(&Met::size(b)).unwrap_or(Ordering::Equal);
+            let by_size = |a: &&&Kink, b: &&&Kink| {
+                KinkGroup::size(a).partial_cmp(&KinkGroup::size(b)).unwrap_or(Ordering::Equal)
+            };
             let Some(&&largest) = kinks.iter().max_by(by_size) else { continue };
             let entries = kinks.iter().map(|kink| (kink.variable, kink.column, kink.row)).collect();
-            let mut met = Met { entries, largest, points: 1, at: subject.graph(&drawn.variables) };
-            let is_same = |other: &mut Met| other.is_jump() == met.is_jump() && other.has_row_of(&met);
+            let mut group = KinkGroup { entries, largest, points: 1, at: subject.graph(&drawn.variables) };
+            let is_same =
+                |other: &mut KinkGroup| other.is_jump() == group.is_jump() && other.has_row_of(&group);
             for other in self.kinks.extract_if(.., is_same).collect::<Vec<_>>() {
-                met.entries.extend(other.entries);
-                met.points += other.points;
-                if Met::size(&other.largest) >= Met::size(&met.largest) {
-                    (met.largest, met.at) = (other.largest, other.at);
+                group.entries.extend(other.entries);
+                group.points += other.points;
+                if KinkGroup::size(&other.largest) >= KinkGroup::size(&group.largest) {
+                    (group.largest, group.at) = (other.largest, other.at);
                 }
             }
-            self.kinks.push(met);
+            self.kinks.push(group);
         }
     }
 
@@ -230,7 +232,7 @@ impl Gathered {
             .iter()
             .map(|f| FreeDirections { count: f.count, among: f.among.iter().map(named).collect() });
         let (mut kinks, others): (Vec<_>, Vec<_>) =
-            self.kinks.iter().map(|met| met.named(subject)).partition(|kink| kink.jump != 0.0);
+            self.kinks.iter().map(|group| group.named(subject)).partition(|kink| kink.jump != 0.0);
         kinks.extend(others);
         FactorReport {
             factor: serde_json::to_value(&*subject.factor).unwrap_or_default(),

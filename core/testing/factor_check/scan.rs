@@ -9,7 +9,7 @@ const STEPS: i32 = 37;
 /// Number of halvings of the step with the largest change of a row.
 const HALVINGS: usize = 30;
 /// A smaller change over the shortest step is not a jump, relative to the row or to 1.
-const SMALL: f64 = 1e-6;
+const JUMP_TOLERANCE: f64 = 1e-6;
 
 /// Finds the jumps along a tangent direction of one variable, the largest one of each row. Each has the
 /// variables just before the jump.
@@ -54,7 +54,7 @@ fn narrow(mut from: (f64, f64), mut to: (f64, f64), f: impl Fn(f64) -> Option<f6
         }
     }
     let jump = (to.1 - from.1).abs();
-    (jump > SMALL * from.1.abs().max(to.1.abs()).max(1.0)).then_some((from.0, jump))
+    (jump > JUMP_TOLERANCE * from.1.abs().max(to.1.abs()).max(1.0)).then_some((from.0, jump))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@ use crate::differences::{Derivative, differentiate_from, jumps};
 use crate::jacobian::JacobianEntry;
 
 /// Smallest difference of the one-sided derivatives at a kink, relative to their size.
-const APART: f64 = 1e-3;
+const MIN_DIFFERENCE: f64 = 1e-3;
 
 /// An entry of a Jacobian at a kink or at a jump.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +56,7 @@ impl Sides {
         if jump > 0.0 {
             return Some(kink);
         }
-        let slack = APART * before.abs().max(after.abs()).max(1.0);
+        let slack = MIN_DIFFERENCE * before.abs().max(after.abs()).max(1.0);
         let between = (before.min(after) - slack / 10.0..=before.max(after) + slack / 10.0).contains(&found);
         (kink.size() > slack && between).then_some(kink)
     }
@@ -69,7 +69,7 @@ pub(crate) fn hull(nearby: &[f64], entry: &JacobianEntry) -> Option<Kink> {
     let before = nearby.iter().copied().reduce(f64::min)?;
     let after = nearby.iter().copied().reduce(f64::max)?;
     let kink = Kink { variable, column, row, before, after, jump: 0.0 };
-    let slack = APART * before.abs().max(after.abs()).max(1.0);
+    let slack = MIN_DIFFERENCE * before.abs().max(after.abs()).max(1.0);
     let among = (before - slack..=after + slack).contains(&found);
     (kink.size() > 10.0 * slack && among).then_some(kink)
 }

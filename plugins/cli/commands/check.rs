@@ -2,6 +2,7 @@
 use crate::failure::Failure;
 use crate::input::document::Content;
 use crate::input::graph_file::{self, GraphFile, Reading};
+use crate::input::kind::{self, InputKind};
 use crate::input::run_file::RunArguments;
 use crate::input::solver::SolverArguments;
 use crate::output;
@@ -9,7 +10,7 @@ use crate::output::report;
 use crate::output::text::{count, list};
 use crate::status::Status;
 use clap::Args;
-use manifactor::config::{Document, Value};
+use manifactor::config::Document;
 use manifactor::graph::{Graph, Key, Values};
 use manifactor::quadric::DualQuadric;
 use manifactor::slam::experiment::Experiment;
@@ -26,6 +27,7 @@ const LARGE: f64 = 30.0;
 /// factors, variables without factors, unconstrained or hardly constrained directions, and values with a
 /// suspicious unit.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor check examples/desk/desk.toml --load")]
 pub(crate) struct Check {
     #[command(flatten)]
     run: RunArguments,
@@ -41,7 +43,7 @@ pub(crate) struct Check {
 
 /// Contents of a document, and warnings about it.
 #[derive(Default)]
-struct Found {
+struct CheckReport {
     lines: Vec<String>,
     warnings: Vec<String>,
     /// Whether a factor is not finite at the initial values.
@@ -52,20 +54,20 @@ impl Check {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         let path = &self.run.config;
         let solver = SolverArguments::set_only(&self.run.set);
-        let found = match Content::open(path)? {
+        let found = match Content::open(path, kind::CHECKED)? {
             Content::Graph(text, format) => graph(&self.reading.plain(path, &text, format, &solver)?)?,
-            Content::Document(document) if is_graph(&document) => {
-                graph(&graph_file::literal(document, &solver)?)?
-            }
-            Content::Document(document) if is_experiment(&document) => self.experiment(document)?,
-            Content::Document(document) => self.document(document)?,
+            Content::Document(document) => match InputKind::of_document(&document) {
+                Some(InputKind::Graph) => graph(&graph_file::literal(document, &solver)?)?,
+                Some(InputKind::Experiment) => self.experiment(document)?,
+                _ => self.document(document)?,
+            },
         };
-        let Found { lines, warnings, is_broken } = &found;
+        let CheckReport { lines, warnings, is_broken } = &found;
         let lines = lines.join("\n");
         if self.json {
-            output::json(&json!({ "errors": [], "warnings": warnings, "found": lines }));
+            output::print_json(&json!({ "errors": [], "warnings": warnings, "found": lines }));
         } else {
-            warnings.iter().for_each(|warning| output::say(&format!("warning: {warning}")));
+            warnings.iter().for_each(|warning| output::print_message(&format!("warning: {warning}")));
             let verdict = match warnings.len() {
                 0 => "nothing wrong".to_owned(),
                 n => format!("nothing wrong with the document; {}", count(n, "warning")),
@@ -76,29 +78,32 @@ impl Check {
     }
 
     /// Reads the settings of every trial; --load has no effect.
-    fn experiment(&self, mut document: Document) -> Result<Found, Failure> {
+    fn experiment(&self, mut document: Document) -> Result<CheckReport, Failure> {
         document.set(&self.run.set)?;
         let sweep = Experiment::read(&document)?;
         let (trials, columns) = (count(sweep.trials.len(), "trial"), sweep.columns.join(", "));
-        Ok(Found { lines: vec![format!("An experiment of {trials}, by {columns}.")], ..Found::default() })
+        Ok(CheckReport {
+            lines: vec![format!("An experiment of {trials}, with the columns {columns}.")],
+            ..CheckReport::default()
+        })
     }
 
-    fn document(&self, document: Document) -> Result<Found, Failure> {
+    fn document(&self, document: Document) -> Result<CheckReport, Failure> {
         let document = self.run.read(document)?;
-        let mut found = Found::default();
+        let mut found = CheckReport::default();
         found.lines.push(format!("A run of {}.", count(document.variants.len(), "variant")));
         let mut run = Running::new(&document, self.run.data());
         for variant in document.variants.iter().filter(|_| self.load) {
             let mapped = MappedSequence::new(run.sequence(variant)?, &variant.settings, &mut Silent)?;
             let MappedSequence { sequence, mapping, .. } = mapped;
-            let mut of_this = Found::default();
+            let mut of_this = CheckReport::default();
             of_this.warnings.extend(mapping.warnings.iter().map(ToString::to_string));
-            of_this.look(&mapping.graph, &mapping.values)?;
+            of_this.check_graph(&mapping.graph, &mapping.values)?;
             found.is_broken |= of_this.is_broken;
             let named = of_this.warnings.iter().map(|warning| format!("{}: {warning}", variant.name));
             found.warnings.extend(named);
             found.lines.push(format!(
-                "{}: {}, {}, {}, {} of which {} mapped, {}",
+                "{}: {}, {}, {}, {} ({} in the map), {}",
                 variant.name,
                 count(sequence.frames.len(), "frame"),
                 count(sequence.detections.len(), "detection"),
@@ -112,9 +117,9 @@ impl Check {
     }
 }
 
-impl Found {
+impl CheckReport {
     /// Checks a graph at the values from which a solve would begin.
-    fn look(&mut self, graph: &Graph, values: &Values) -> Result<(), Failure> {
+    fn check_graph(&mut self, graph: &Graph, values: &Values) -> Result<(), Failure> {
         let huge = |(key, value): (&Key, &dyn manifactor::graph::Variable)| {
             let quadric = value.erased().as_any().downcast_ref::<DualQuadric>()?;
             (quadric.semi_axes.max() > LARGE).then(|| key.to_string())
@@ -123,7 +128,7 @@ impl Found {
         if !huge.is_empty() {
             let keys = list(huge.iter());
             self.warnings.push(format!(
-                "longer than {} m: {keys}; semi-axes are metres here; are these millimetres?",
+                "objects longer than {} m: {keys}; the unit of semi-axes is metres; are these millimetres?",
                 2.0 * LARGE
             ));
         }
@@ -131,38 +136,23 @@ impl Found {
             return Ok(());
         }
         let mut problem = Problem::compile(graph, values).map_err(Failure::input)?;
-        let at_start = problem.at_start();
+        let at_start = problem.diagnose_start();
         self.is_broken |= at_start.not_finite.is_some();
         self.warnings.extend(report::at_start(&at_start, graph.factors().len()));
         if at_start.not_finite.is_none() {
-            self.lines.push(format!("cost {:.6} at these values", at_start.cost));
+            self.lines.push(format!("cost {:.6} at the initial values", at_start.cost));
         }
         Ok(())
     }
 }
 
 /// Returns the contents of a graph, and prints the decisions of the reader on stderr.
-fn graph(input: &GraphFile) -> Result<Found, Failure> {
+fn graph(input: &GraphFile) -> Result<CheckReport, Failure> {
     for note in &input.notes {
-        output::note(note);
+        output::print_note(note);
     }
-    let mut found = Found::default();
+    let mut found = CheckReport::default();
     found.lines.push(graph_file::summary(input).trim_end().to_owned());
-    found.look(&input.graph, &input.values)?;
+    found.check_graph(&input.graph, &input.values)?;
     Ok(found)
-}
-
-/// Returns whether a document is a literal graph. A run may define `variables` too, but it also has a
-/// `source`.
-fn is_graph(document: &Document) -> bool {
-    has(document, "variables") && !has(document, "source")
-}
-
-/// Returns whether a document is an experiment; a run has no `axes`.
-fn is_experiment(document: &Document) -> bool {
-    has(document, "axes") && !has(document, "source")
-}
-
-fn has(document: &Document, field: &str) -> bool {
-    matches!(&document.root().value, Value::Table(table) if table.contains_key(field))
 }

@@ -1,11 +1,14 @@
 //! `manifactor evaluate`: compares a trajectory with the ground truth.
 use crate::failure::Failure;
+use crate::input::kind::{self, Expected, InputKind};
 use crate::output;
 use crate::output::text::{self, Table};
 use crate::status::Status;
 use clap::{Args, ValueEnum};
-use manifactor::formats::detections;
-use manifactor::formats::tum;
+use manifactor::config::Document;
+use manifactor::formats::detections::{self, Detection};
+use manifactor::formats::read_text;
+use manifactor::formats::tum::{self, Trajectory};
 use manifactor::graph::checked::Positive;
 use manifactor::slam::metrics::{
     Alignment, MetricsError, Pairing, Statistics, absolute_error, align, associate, identity, pair_boxes,
@@ -13,13 +16,16 @@ use manifactor::slam::metrics::{
 };
 use serde_json::json;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Compare two trajectories in the TUM format (timestamp tx ty tz qx qy qz qw): ATE and RPE.
 ///
 /// With --boxes, compare the data association of two files of detections instead (CSV, as for the source
 /// `tum`).
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  manifactor simulate examples/desk/desk.toml --out recording\n  manifactor evaluate recording/groundtruth.txt recording/odometry.txt"
+)]
 pub(crate) struct Evaluate {
     /// The true trajectory, or with --boxes the detections with their true objects.
     truth: PathBuf,
@@ -79,7 +85,8 @@ impl Evaluate {
         if self.boxes {
             return self.boxes();
         }
-        let (truth, estimate) = (tum::read(&self.truth)?, tum::read(&self.estimate)?);
+        let truth = read_trajectory(&self.truth)?;
+        let estimate = read_trajectory(&self.estimate)?;
         let pairing = if self.all_pairs { Pairing::All } else { Pairing::Consecutive };
         let measure = || -> Result<_, MetricsError> {
             let pairs = associate(&truth.poses, &estimate.poses, self.within.get())?;
@@ -92,13 +99,13 @@ impl Evaluate {
         let warning = (2 * pairs < poses[0].min(poses[1])).then(|| {
             let within = self.within.get();
             format!(
-                "the errors are over {pairs} poses, less than half of the {} of the estimate and of the {} of the truth: no other \
-                 pose has a partner within {within} s; --within SECONDS sets the limit",
+                "the errors cover {pairs} poses, less than half of the {} estimated and of the {} true poses: no other pose has a \
+                 match within {within} s; --within SECONDS sets the limit",
                 poses[0], poses[1]
             )
         });
         if self.json {
-            output::json(&json!({
+            output::print_json(&json!({
                 "pairs": pairs, "poses": { "estimate": poses[0], "truth": poses[1] }, "warning": warning,
                 "scale": scale, "ate": ate,
                 "rpe": { "translation": rpe.translation, "rotation": rpe.rotation },
@@ -117,7 +124,7 @@ impl Evaluate {
             table.text()
         ));
         if let Some(warning) = warning {
-            output::say(&format!("warning: {warning}"));
+            output::print_message(&format!("warning: {warning}"));
         }
         Ok(Status::Done)
     }
@@ -126,37 +133,42 @@ impl Evaluate {
 impl Evaluate {
     /// Compares the objects of the boxes.
     fn boxes(&self) -> Result<Status, Failure> {
-        let (truth, put) = (detections::read(&self.truth)?, detections::read(&self.estimate)?);
-        let named = pair_boxes(&truth, &put);
-        let missing = named.iter().filter(|(_, put)| put.is_none()).count();
+        let truth = read_detections(&self.truth)?;
+        let estimate = read_detections(&self.estimate)?;
+        let named = pair_boxes(&truth, &estimate);
+        let missing = named.iter().filter(|(_, estimate)| estimate.is_none()).count();
         if named.is_empty() || missing == named.len() {
-            let (truth, put) = (self.truth.display(), self.estimate.display());
-            return Err(Failure::input(format!(
-                "{put} has none of the {} of {truth} that have an object: are time stamps and sides written alike?",
-                text::count(named.len(), "box")
-            )));
+            return Err(Failure::with_help(
+                format!(
+                    "{} has none of the {} with an object in {}",
+                    self.estimate.display(),
+                    text::count(named.len(), "box"),
+                    self.truth.display()
+                ),
+                "boxes match if their timestamps and their four sides are equal",
+            ));
         }
-        let scores = identity(named.iter().map(|(truth, put)| (*truth, put.flatten())));
+        let scores = identity(named.iter().map(|(truth, estimate)| (*truth, estimate.flatten())));
         if self.json {
-            output::json(&json!({ "missing": missing, "scores": scores }));
+            output::print_json(&json!({ "missing": missing, "scores": scores }));
             return Ok(Status::Done);
         }
         let mut table = Table::of_numbers(&["pairs of boxes", "precision", "recall", "F1"]);
         let number = |x: f64| format!("{x:.4}");
         table.row([
-            "together".to_owned(),
+            "same object".to_owned(),
             number(scores.precision),
             number(scores.recall),
             number(scores.f1),
         ]);
-        let mut told = format!(
-            "{}, {}, {} of 3 boxes or more\n{}\n",
+        let mut summary = format!(
+            "{}, {}, {} with 3 boxes or more\n{}\n",
             text::count(scores.boxes, "box"),
             text::count(scores.true_objects, "true object"),
-            text::count(scores.objects, "object"),
+            text::count(scores.objects, "estimated object"),
             table.text()
         );
-        told += &format!(
+        summary += &format!(
             "homogeneity {:.4}, completeness {:.4}, identity F1 {:.4}, {}\n",
             scores.homogeneity,
             scores.completeness,
@@ -164,11 +176,34 @@ impl Evaluate {
             text::count(scores.switches, "switch")
         );
         if missing > 0 {
-            told += &format!("{} not in {}: alone\n", text::count(missing, "box"), self.estimate.display());
+            summary += &format!(
+                "{} missing in {}: each counts as an object by itself\n",
+                text::count(missing, "box"),
+                self.estimate.display()
+            );
         }
-        output::print(&told);
+        output::print(&summary);
         Ok(Status::Done)
     }
+}
+
+/// Reads a file that has to be a trajectory.
+fn read_trajectory(path: &Path) -> Result<Trajectory, Failure> {
+    Ok(tum::parse(&read_as(path, kind::TRAJECTORY)?, path)?)
+}
+
+/// Reads a file that has to be a table of detections.
+fn read_detections(path: &Path) -> Result<Vec<Detection>, Failure> {
+    Ok(detections::parse(&read_as(path, kind::DETECTIONS)?, path)?)
+}
+
+/// Reads a file. If it is of a different kind, the error names the command for it.
+fn read_as(path: &Path, expected: Expected) -> Result<String, Failure> {
+    expected.refuse_folder(path)?;
+    let text = read_text(path)?;
+    let of_document = || InputKind::of_document(&Document::open(path).ok()?);
+    expected.check(path, InputKind::of_text(path, &text).or_else(of_document))?;
+    Ok(text)
 }
 
 fn row(name: &str, s: &Statistics) -> [String; 7] {

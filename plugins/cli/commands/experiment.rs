@@ -1,7 +1,7 @@
 //! `manifactor experiment`: runs a sweep from its document to its tables.
 use crate::failure::Failure;
-use crate::input::document;
-use crate::input::pictures::Look;
+use crate::input::pictures::PictureStyle;
+use crate::input::{document, kind};
 use crate::interrupt;
 use crate::output::text::{count, on_one_line};
 use crate::output::{self, summary_table};
@@ -28,6 +28,7 @@ use std::time::Duration;
 /// trial), summary.csv, summary.md and summary.json (means, and paired differences with 95 % bootstrap
 /// intervals), times.csv, and report.html, which needs no network.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor experiment examples/experiments/simulation/tuning.toml")]
 pub(crate) struct Experiment {
     /// The document that describes the experiment.
     config: PathBuf,
@@ -58,7 +59,7 @@ pub(crate) struct Experiment {
 
 impl Experiment {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
-        let mut document = document::open(&self.config)?;
+        let mut document = document::open(&self.config, kind::EXPERIMENT)?;
         document.set(&self.set)?;
         let mut sweep = Sweep::read(&document)?;
         if let Some(out) = &self.out {
@@ -83,8 +84,8 @@ impl Experiment {
         if self.shard.is_some() {
             drop(bar);
             let (trials, folder) = (count(sweep.trials.len(), "trial"), sweep.output.display());
-            output::say(&format!(
-                "This part has {trials}: {folder}. The same command without --shard makes the tables."
+            output::print_message(&format!(
+                "The {trials} of this part are in {folder}. The same command without --shard writes the tables."
             ));
             return Ok(status);
         }
@@ -97,26 +98,26 @@ impl Experiment {
             interrupt.poll()
         })?;
         drop(bar);
-        self.tell(&sweep, &summary);
+        self.print_summary(&sweep, &summary);
         if !is_drawn {
             status = Status::Interrupted;
-            output::say(
-                "interrupted: pictures are missing, or those of an earlier run; the same command draws them",
+            output::print_message(
+                "interrupted: some pictures are missing or from an earlier run; repeat the command to draw them",
             );
         }
         Ok(status)
     }
 
-    fn tell(&self, sweep: &Sweep, summary: &ExperimentSummary) {
+    fn print_summary(&self, sweep: &Sweep, summary: &ExperimentSummary) {
         if self.json {
-            output::json(summary);
+            output::print_json(summary);
         } else {
             output::print(&summary_table::of(summary));
             output::print(&format!("\nWritten to {}.\n", sweep.output.display()));
         }
         if summary.open > 0 {
             let open = count(summary.open, "trial");
-            output::say(&format!("{open} still to be run: the same command goes on."));
+            output::print_message(&format!("{open} not yet run; repeat the command to continue."));
         }
     }
 }
@@ -141,9 +142,9 @@ fn write_until(
     let trials = experiment::trials_table(sweep, journal);
     let page = experiment_page(sweep, &summary, &trials, text);
     write_whole(&sweep.output.join("report.html"), page)?;
-    let look = Look::default();
-    let pictures = experiment_pictures(sweep, &summary, &trials, look.width());
-    let is_drawn = look.write(&sweep.output, &pictures, goes_on)?;
+    let style = PictureStyle::default();
+    let pictures = experiment_pictures(sweep, &summary, &trials, style.width());
+    let is_drawn = style.write(&sweep.output, &pictures, goes_on)?;
     Ok((summary, is_drawn))
 }
 
@@ -159,7 +160,7 @@ impl Bar {
             return Self::Lines;
         }
         let bar = ProgressBar::new(0).with_prefix(on_one_line(title).into_owned());
-        let template = "{prefix} {wide_bar} {pos}/{len} trials, {elapsed} gone, {eta} left {msg}";
+        let template = "{prefix} {wide_bar} {pos}/{len} trials, {elapsed} elapsed, {eta} left {msg}";
         // if the literal template is invalid, the default style is good enough
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
@@ -185,7 +186,10 @@ impl Bar {
             }
             // about twenty lines
             Self::Lines if done == kept || done == trials || done % trials.div_ceil(20) == 0 => {
-                output::say(&format!("{done} of {} done, {kept} of them before", count(trials, "trial")));
+                output::print_message(&format!(
+                    "{done} of {} done, {kept} of them by earlier commands",
+                    count(trials, "trial")
+                ));
             }
             Self::Lines => {}
         }

@@ -13,6 +13,9 @@ use std::path::PathBuf;
 /// Show the factors of a graph by key, with residual, cost and weight, before and after a solve.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("form").args(["dot", "json", "svg"]))]
+#[command(
+    after_help = "Example:\n  manifactor graph examples/03_relations/graph.toml --solve --sort cost --top 5"
+)]
 pub(crate) struct ShowGraph {
     /// A graph, or the folder of a run's variant, which holds graph.json.
     graph: PathBuf,
@@ -51,11 +54,12 @@ enum Order {
 
 impl ShowGraph {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
-        let path = if self.graph.is_dir() { self.graph.join("graph.json") } else { self.graph.clone() };
+        let in_folder = self.graph.join("graph.json");
+        let path = if in_folder.is_file() { in_folder } else { self.graph.clone() };
         let mut input = self.reading.open(&path, &self.solver)?;
         input.notes.extend(self.what_if.apply(&mut input.graph, &input.values)?);
         for note in &input.notes {
-            output::note(note);
+            output::print_note(note);
         }
         let mut status = Status::Done;
         let mut after = None;
@@ -73,7 +77,7 @@ impl ShowGraph {
         }
         inspection.factors.truncate(self.top.unwrap_or(usize::MAX));
         if self.json {
-            output::json(&inspection);
+            output::print_json(&inspection);
         } else if self.dot {
             output::print(&inspection.dot());
         } else if self.svg {

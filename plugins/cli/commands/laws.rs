@@ -16,9 +16,9 @@ fn linked(kind: &'static str, name: &str, register: &str) -> Result<&'static Ent
         let meant = nearest(name, names.iter().map(|e| e.name));
         let meant = meant.map(|m| format!("did you mean `{m}`? ")).unwrap_or_default();
         let help = format!(
-            "`manifactor list {kind}s` prints all that are linked. One of your own needs its line `{register}`, and a binary \
-             that links its crate: `use my_plugin as _;`"
+            "`manifactor list {kind}s` prints the linked ones. A {kind} of a plugin needs its line `{register}`, and a binary that \
+             links its crate: `use my_plugin as _;`"
         );
-        Failure::with_help(format!("no {kind} is called `{name}`"), meant + &help)
+        Failure::with_help(format!("unknown {kind} `{name}`"), meant + &help)
     })
 }

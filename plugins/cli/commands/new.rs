@@ -9,19 +9,21 @@ use std::path::{Path, PathBuf};
 
 /// Write the files of a new project.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor new plugin on_the_shelf")]
 pub(crate) struct New {
     #[command(subcommand)]
-    what: What,
+    project: NewProject,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum NewProject {
     Plugin(Plugin),
 }
 
 /// A crate with one factor, its tests, an example graph and run, a binary that knows the factor, and a
 /// README.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor new plugin on_the_shelf")]
 struct Plugin {
     /// Name of the folder, the crate and the factor, in snake case or with hyphens.
     name: String,
@@ -44,7 +46,7 @@ const FILES: [(&str, &str); 9] = [
 
 impl New {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
-        let What::Plugin(plugin) = &self.what;
+        let NewProject::Plugin(plugin) = &self.project;
         plugin.write()
     }
 }
@@ -56,14 +58,14 @@ impl Plugin {
         let names = Names::of(crate_name)?;
         if find("factor", &names.factor).is_some() {
             return Err(Failure::with_help(
-                format!("there is a factor `{}` already: see `manifactor explain {0}`", names.factor),
-                "choose another name: two factors of one name cannot be linked together",
+                format!("the factor `{}` exists already; see `manifactor explain {0}`", names.factor),
+                "choose another name: a binary cannot have two factors with one name",
             ));
         }
         let (source, cli_source) = self.sources()?;
         // a dangling symbolic link counts as existing too
         if folder.symlink_metadata().is_ok() {
-            let there = format!("{} is there already", folder.display());
+            let there = format!("{} exists already", folder.display());
             return Err(Failure::with_help(there, "choose another name, or remove the folder first"));
         }
         for (path, text) in FILES {
@@ -78,7 +80,7 @@ impl Plugin {
             let path = folder.join(fill(path));
             write_whole(&path, fill(text))?;
         }
-        output::print(&format!("{0} is written. Next:\n  cd {0}\n  cargo test\n", folder.display()));
+        output::print(&format!("{0} is written. Next steps:\n  cd {0}\n  cargo test\n", folder.display()));
         Ok(Status::Done)
     }
 
@@ -91,9 +93,11 @@ impl Plugin {
         let root = path.canonicalize().map_err(Failure::at(path))?;
         let cli = root.join("plugins").join("cli");
         if !cli.join("Cargo.toml").is_file() {
-            let what =
-                format!("{} is no checkout of Manifactor: it has no plugins/cli/Cargo.toml", root.display());
-            return Err(Failure::with_help(what, "give the folder that has Manifactor's README in it"));
+            let what = format!(
+                "{} is not a checkout of Manifactor: it has no plugins/cli/Cargo.toml",
+                root.display()
+            );
+            return Err(Failure::with_help(what, "give the root folder of a checkout"));
         }
         // a basic string of TOML can hold any character, and JSON strings are valid TOML
         let text = |path: &Path| serde_json::to_string(&path.display().to_string()).unwrap_or_default();
@@ -119,14 +123,14 @@ impl Names {
         {
             return Err(Failure::with_help(
                 format!("`{name}` cannot be the name of a crate and of a factor"),
-                "use words of small letters and digits, joined by `_` or `-`, such as `on_the_shelf`; no keyword of Rust",
+                "use words of lower-case letters and digits, joined by `_` or `-`, such as `on_the_shelf`, and no keyword of Rust",
             ));
         }
         // Cargo treats - and _ alike
         if CRATES.contains(&name.replace('-', "_").as_str()) {
             return Err(Failure::with_help(
                 format!(
-                    "`{name}` is the name of a crate of Rust or of Manifactor, and cannot be that of a plugin"
+                    "`{name}` is the name of a crate of Rust or of Manifactor, so a plugin cannot have it"
                 ),
                 "choose another name, such as `on_the_shelf`",
             ));

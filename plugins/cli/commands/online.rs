@@ -6,12 +6,12 @@ use crate::output;
 use crate::output::text::{count, seconds};
 use crate::output::watch::Watch as Progress;
 use crate::status::Status;
-use crate::view::{Solve, View, address};
+use crate::view::{SolveDisplay, View, address};
 use clap::Args;
 use manifactor::slam::online::{FrameError, FrameReport, Mapper};
 use manifactor::slam::run::{RunError, StreamWatcher};
 use manifactor::slam::sequence::Observation;
-use manifactor::solve::{All, Interrupt};
+use manifactor::solve::{AllObservers, Interrupt};
 use serde_json::json;
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
@@ -26,6 +26,7 @@ use std::time::{Duration, Instant};
 /// the map as soon as it can be initialized. The noise stays as given until the end. The settings of the
 /// smoother are in the table `online` of the document.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor online examples/desk/desk.toml --out out/online --every 50")]
 pub(crate) struct Online {
     #[command(flatten)]
     pub(crate) options: RunOptions,
@@ -49,7 +50,7 @@ pub(crate) struct Online {
 
 fn faster(text: &str) -> Result<f64, String> {
     let rate = text.parse().ok().filter(|rate: &f64| *rate > 0.0 && rate.is_finite());
-    rate.ok_or_else(|| "expected a number above 0: 1 is as fast as it was recorded".to_owned())
+    rate.ok_or_else(|| "expected a number above 0; 1 is the recorded speed".to_owned())
 }
 
 impl Online {
@@ -67,26 +68,26 @@ impl Online {
             }
             let mut progress = Progress::new(verbose, &variant.name);
             let interrupted = interrupt.clone();
-            let mut solve = Solve(view.as_ref());
-            let mut observers = All(vec![&mut progress, &mut interrupt, &mut solve]);
+            let mut solve = SolveDisplay(view.as_ref());
+            let mut observers = AllObservers(vec![&mut progress, &mut interrupt, &mut solve]);
             let mut frames =
                 Frames { command: self, interrupt: interrupted, view: view.as_ref(), frames: 0, begun: None };
             let done = run.run_variant_online(variant, &mut frames, &mut observers)?;
             if let Some(view) = &view {
-                view.settle(&done.0);
+                view.show_estimate(&done.0);
             }
             Ok(done)
         });
         if let Some(view) = view {
             view.end(match &report {
-                Ok(report) if report.complete => "all is written",
-                Ok(_) => "interrupted; what there was is written",
-                Err(_) => "it failed: the program says why",
+                Ok(report) if report.complete => "finished; all files are written",
+                Ok(_) => "interrupted; the results so far are written",
+                Err(_) => "failed; see the error message of the program",
             });
         }
         let report = report?;
         if self.options.json {
-            output::json_line(&report);
+            output::print_json_line(&report);
         }
         Ok(Status::from(&report))
     }
@@ -129,11 +130,11 @@ impl Frames<'_> {
         if self.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    fn tell(&self, report: &FrameReport, mapper: &Mapper, took: f64) {
+    fn print_frame(&self, report: &FrameReport, mapper: &Mapper, took: f64) {
         let (objects, undetermined) =
-            (mapper.mapped_objects(), report.updates.last().map_or(0, |u| u.undetermined.len()));
+            (mapper.mapped_objects(), report.updates.last().map_or(0, |u| u.undetermined_directions.len()));
         if self.command.options.json {
-            output::json_line(&json!({ "seconds": took, "objects": objects, "report": report }));
+            output::print_json_line(&json!({ "seconds": took, "objects": objects, "report": report }));
         } else {
             let open = if undetermined > 0 {
                 format!(", {undetermined} directions undetermined")
@@ -141,8 +142,8 @@ impl Frames<'_> {
                 String::new()
             };
             let frames = count(report.frame + 1, "frame");
-            output::say(&format!(
-                "{frames}: {}{open}, the last in {}",
+            output::print_message(&format!(
+                "{frames}: {}{open}, last frame in {}",
                 count(objects, "object"),
                 seconds(took)
             ));
@@ -179,19 +180,19 @@ impl StreamWatcher for Frames<'_> {
         }
         match report {
             Ok(report) => {
-                report.refused.iter().for_each(|refused| output::note(refused));
+                report.refused.iter().for_each(|refused| output::print_note(refused));
                 if let Some(located) = &report.located {
                     let (frames, objects) =
                         (count(report.frame + 1, "frame"), count(located.matches.len(), "object"));
-                    output::note(&format!(
-                        "after {frames} the place in the prior map is found, by {objects}: names and poses are those of that map from now on"
+                    output::print_note(&format!(
+                        "after {frames}, relocalized in the prior map by {objects}: from now on, names and poses are those of that map"
                     ));
                 }
                 if self.frames.is_multiple_of(self.command.every) || report.located.is_some() {
-                    self.tell(report, mapper, took);
+                    self.print_frame(report, mapper, took);
                 }
             }
-            Err(error) => output::note(&error.to_string()),
+            Err(error) => output::print_note(&error.to_string()),
         }
         self.goes_on()
     }

@@ -2,7 +2,7 @@
 use crate::failure::Failure;
 use crate::input::destination::Destination;
 use crate::input::graph_file::{self, GraphFile};
-use crate::input::pictures::Look;
+use crate::input::pictures::PictureStyle;
 use crate::input::solver::SolverArguments;
 use crate::interrupt;
 use crate::output;
@@ -12,8 +12,8 @@ use clap::Args;
 use manifactor::formats::replay::{GraphReplay as Steps, Latencies, ReplayStep};
 use manifactor::graph::{Graph, Key};
 use manifactor::slam::output::OutputFolder;
-use manifactor::smoother::{Finished, Rejection, Report, Session, Span};
-use manifactor::solve::{All, Interrupt, Silent};
+use manifactor::smoother::{Finished, Rejection, Smoother, Span, UpdateReport};
+use manifactor::solve::{AllObservers, Interrupt, Silent};
 use manifactor::viz::latencies;
 use serde_json::json;
 use std::collections::HashSet;
@@ -28,6 +28,7 @@ use std::time::Instant;
 /// the estimate of the previous pose. Fixed variables, and those that odometry does not reach, begin at the
 /// values in the file. At the end, the whole graph is solved as one batch.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor replay tests/fuzz/corpus/replay/plane.g2o --every 1 --gap")]
 pub(crate) struct Replay {
     /// The graph.
     graph: PathBuf,
@@ -57,9 +58,9 @@ const NAMED: usize = 6;
 
 /// Result of a replay.
 struct Replayed {
-    session: Session,
+    session: Smoother,
     times: Vec<f64>,
-    report: Report,
+    report: UpdateReport,
     interrupted: bool,
     /// Number of factors left out because a variable had already left the window.
     left_out: usize,
@@ -72,32 +73,32 @@ impl Replay {
         let _claimed = self.plot.as_deref().map(claim).transpose()?;
         if self.solver.names_a_start() {
             return Err(Failure::with_help(
-                "a replay begins each pose where odometry leads: --start has no meaning here",
-                "leave it out",
+                "--start has no effect in a replay: odometry gives the initial value of each pose",
+                "remove --start",
             ));
         }
         let input = self.reading.open(&self.graph, &self.solver)?;
         if matches!(&input.online.window, Some(window) if matches!(window.span, Span::Seconds(_))) {
             return Err(Failure::with_help(
                 format!(
-                    "{}: its poses have no times, so `online.window.seconds` has no meaning",
+                    "{}: the poses have no timestamps, so `online.window.seconds` cannot be used",
                     self.graph.display()
                 ),
                 "use `window.poses`: --set online.window.poses=200",
             ));
         }
-        input.notes.iter().for_each(|note| output::note(note));
+        input.notes.iter().for_each(|note| output::print_note(note));
         let keys = input.graph.factors().iter().flat_map(|entry| &entry.keys);
         let keys: HashSet<&str> = keys.map(Key::as_str).collect();
         let alone = input.values.iter().filter(|(key, _)| !keys.contains(key.as_str())).count();
         if alone > 0 {
-            output::note(&format!("{} without factors left out", count(alone, "variable")));
+            output::print_note(&format!("{} without factors: left out", count(alone, "variable")));
         }
         let mut interrupt = interrupt::on_ctrl_c();
         let mut replayed = self.replay(&input, &interrupt)?;
         let cost = replayed.session.cost();
         let clock = Instant::now();
-        let observer = &mut All(vec![&mut interrupt]);
+        let observer = &mut AllObservers(vec![&mut interrupt]);
         let finished = match replayed.interrupted {
             true => None,
             false => Some(replayed.session.finish(&*input.optimizer, observer).map_err(Failure::input)?),
@@ -109,11 +110,11 @@ impl Replay {
         }
         if let Some(folder) = &self.plot {
             let title = format!("{}: latency of each update", self.graph.display());
-            let look = Look::default();
-            let picture = latencies(&title, &replayed.times, look.width());
-            look.write(folder, picture.as_slice(), |_| ControlFlow::Continue(()))?;
+            let style = PictureStyle::default();
+            let picture = latencies(&title, &replayed.times, style.width());
+            style.write(folder, picture.as_slice(), |_| ControlFlow::Continue(()))?;
         }
-        self.tell(&mut replayed, cost, finished.as_ref(), batch);
+        self.print_summary(&mut replayed, cost, finished.as_ref(), batch);
         Ok(match finished {
             Some(finished) => Status::from(&finished.outcome.termination),
             None => Status::Interrupted,
@@ -121,8 +122,8 @@ impl Replay {
     }
 
     fn replay(&self, input: &GraphFile, interrupt: &Interrupt) -> Result<Replayed, Failure> {
-        let session = Session::new(input.online.clone());
-        let report = Report::default();
+        let session = Smoother::new(input.online.clone());
+        let report = UpdateReport::default();
         let mut replayed = Replayed { session, times: vec![], report, interrupted: false, left_out: 0 };
         let mut steps = Steps::of(&input.graph, &input.values);
         if steps.is_empty() {
@@ -147,14 +148,14 @@ impl Replay {
                 step.values.iter().last().and_then(|(key, _)| replayed.session.estimate(key.as_str()));
             replayed.times.push(clock.elapsed().as_secs_f64());
             if (replayed.times.len() as u64).is_multiple_of(self.every) || steps.is_empty() {
-                self.tell_step(&mut replayed, input)?;
+                self.print_step(&mut replayed, input)?;
             }
         }
         Ok(replayed)
     }
 
     /// Reports the state after the last step.
-    fn tell_step(&self, replayed: &mut Replayed, input: &GraphFile) -> Result<(), Failure> {
+    fn print_step(&self, replayed: &mut Replayed, input: &GraphFile) -> Result<(), Failure> {
         let Replayed { session, times, report, .. } = replayed;
         let (poses, last) = (times.len(), times.last().copied().unwrap_or_default());
         let cost = session.cost();
@@ -170,33 +171,33 @@ impl Replay {
                 "poses": poses, "variables": session.variables(), "cost": cost, "gap": gap,
                 "seconds": last, "report": report,
             });
-            output::json_line(&line);
+            output::print_json_line(&line);
         } else {
-            let (redone, last) = (count(report.redone, "variable"), seconds(last));
-            let gap = gap.map_or_else(String::new, |gap| format!(", {gap:.1e} above the batch"));
-            output::say(&format!(
-                "{}: cost {cost:.6}{gap}, last update {last} ({redone} redone)",
+            let (redone, last) = (count(report.refactorized, "variable"), seconds(last));
+            let gap = gap.map_or_else(String::new, |gap| format!(", {gap:.1e} above the batch solve"));
+            output::print_message(&format!(
+                "{}: cost {cost:.6}{gap}, last update {last} ({redone} eliminated again)",
                 count(poses, "pose")
             ));
         }
         Ok(())
     }
 
-    fn tell(&self, replayed: &mut Replayed, cost: f64, finished: Option<&Finished>, batch: f64) {
+    fn print_summary(&self, replayed: &mut Replayed, cost: f64, finished: Option<&Finished>, batch: f64) {
         let Replayed { session, times, report, interrupted, left_out } = replayed;
         let rejections = session.rejections();
         let latencies = Latencies::of(times);
         let outcome = finished.map(|finished| &finished.outcome);
         if self.json {
-            output::json_line(&json!({
+            output::print_json_line(&json!({
                 "graph": self.graph.display().to_string(),
                 "poses": times.len(),
                 "variables": session.variables(),
                 "latencies": latencies,
                 "bytes": session.bytes(),
                 "cost": cost,
-                "parked": report.parked,
-                "undetermined": report.undetermined,
+                "parked": report.undetermined_variables,
+                "undetermined": report.undetermined_directions,
                 "inactive": report.inactive,
                 "final_cost": outcome.map(|o| o.final_cost),
                 "termination": outcome.map(|o| &o.termination),
@@ -216,15 +217,14 @@ impl Replay {
             table.text() + "\n" + &format!("cost {cost:.6} after {}\n", count(times.len(), "pose"));
         if let Some(outcome) = outcome {
             text += &format!(
-                "cost {:.6} as one batch, {} more: {}\n",
+                "cost {:.6} after a batch solve of {}: {}\n",
                 outcome.final_cost,
                 seconds(batch),
                 outcome.termination
             );
         }
         if *left_out > 0 {
-            text +=
-                &format!("{} left out: the window had no room for a variable\n", count(*left_out, "factor"));
+            text += &format!("{} left out: a variable had left the window\n", count(*left_out, "factor"));
         }
         if !rejections.is_empty() {
             text += &format!("{} rejected as outliers: ", count(rejections.len(), "factor"));
@@ -237,18 +237,21 @@ impl Replay {
             let more = if rejections.len() > NAMED { ", …; see --json" } else { "" };
             text += &format!("{}{more}\n", first.join(", "));
         }
-        if !report.parked.is_empty() {
-            text += &format!("waiting for factors that determine them: {}\n", keys(&report.parked));
+        if !report.undetermined_variables.is_empty() {
+            text += &format!(
+                "undetermined, and excluded until factors determine them: {}\n",
+                keys(&report.undetermined_variables)
+            );
         }
-        for (key, direction) in &report.undetermined {
-            text += &format!("nothing constrains {key}.{direction}\n");
+        for (key, direction) in &report.undetermined_directions {
+            text += &format!("no factor constrains {key}.{direction}\n");
         }
         output::print(&text);
     }
 }
 
 /// Removes the factors of variables that are no longer in the smoother, and returns their number.
-fn leave_out(step: &mut ReplayStep, session: &Session) -> usize {
+fn leave_out(step: &mut ReplayStep, session: &Smoother) -> usize {
     let is_there = |key: &Key| step.values.contains(key.as_str()) || session.estimate(key.as_str()).is_some();
     let mut factors = Graph::new();
     for entry in step.factors.factors().iter().filter(|entry| entry.keys.iter().all(is_there)) {

@@ -1,6 +1,6 @@
 //! `manifactor run`: computes a run from its document and writes its files.
 use crate::failure::Failure;
-use crate::input::pictures::Look;
+use crate::input::pictures::PictureStyle;
 use crate::input::run_file::RunArguments;
 use crate::interrupt;
 use crate::output::watch::Watch;
@@ -13,7 +13,7 @@ use manifactor::slam::record::{RunRecord, VariantRecord};
 use manifactor::slam::report::{RunReport, VariantReport};
 use manifactor::slam::run::{Run as Running, RunError};
 use manifactor::slam::run_document::RunVariant;
-use manifactor::solve::{All, Interrupt, Observer};
+use manifactor::solve::{AllObservers, Interrupt, Observer};
 use manifactor::viz::{latencies, ply, run_page};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -25,6 +25,7 @@ use std::path::PathBuf;
 /// and poses over time, residuals, cost, images). report.html shows everything, with the map in 3D, and
 /// needs no network. `manifactor plot` draws the pictures again.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor run examples/desk/desk.toml --out out/desk")]
 pub(crate) struct Run {
     #[command(flatten)]
     pub(crate) options: RunOptions,
@@ -51,10 +52,10 @@ impl Run {
         let mut interrupt = interrupt::on_ctrl_c();
         let report = self.options.run_as("run", verbose, interrupt.clone(), |run, variant| {
             let mut watch = Watch::new(verbose, &variant.name);
-            run.run_variant(variant, &mut All(vec![&mut watch, &mut interrupt]))
+            run.run_variant(variant, &mut AllObservers(vec![&mut watch, &mut interrupt]))
         })?;
         if self.options.json {
-            output::json(&report);
+            output::print_json(&report);
         }
         Ok(Status::from(&report))
     }
@@ -79,7 +80,7 @@ impl RunOptions {
         // the claim lasts to the end
         let _claimed = OutputFolder::claim(&document.output, command, &self.run.config, self.force)?;
         let (mut records, mut configs) = (vec![], vec![]);
-        let look = Look::default();
+        let style = PictureStyle::default();
         let mut run = Running::new(&document, self.run.data());
         for variant in &document.variants {
             tracing::info!("variant {}", variant.name);
@@ -90,8 +91,8 @@ impl RunOptions {
             let folder = write_variant(&document, variant, &estimate, &report, &record)?;
             if let Some(online) = &report.online {
                 let title = format!("{}: latency of each frame", variant.name);
-                let picture = latencies(&title, &online.seconds, look.width());
-                look.write(&folder, picture.as_slice(), |_| ControlFlow::Continue(()))?;
+                let picture = latencies(&title, &online.seconds, style.width());
+                style.write(&folder, picture.as_slice(), |_| ControlFlow::Continue(()))?;
             }
             configs.push(std::fs::read_to_string(folder.join("config.toml")).map_err(Failure::at(&folder))?);
             records.push(record);
@@ -113,7 +114,7 @@ impl RunOptions {
         if !report.complete {
             interrupt = Interrupt::default();
         }
-        let drawn = look.draw_run(&document.output, &record, &mut watch, &mut interrupt)?;
+        let drawn = style.draw_run(&document.output, &record, &mut watch, &mut interrupt)?;
         let missing = drawn.message(&document.output);
         if missing.is_some() {
             report.complete = false;
@@ -121,12 +122,12 @@ impl RunOptions {
         }
         drop(watch);
         if !self.json {
-            output::print(&table::of_run(&report));
+            output::print(&table::of_run(&report, verbose > 0));
             let out = document.output.display();
             output::print(&format!("\nWritten to {out}; open {out}/report.html in a browser.\n"));
         }
         if let Some(missing) = missing {
-            output::say(&missing);
+            output::print_message(&missing);
         }
         Ok(report)
     }

@@ -16,6 +16,7 @@ use std::path::PathBuf;
 ///
 /// The files are odometry.txt and groundtruth.txt (TUM format), detections.csv and objects.json.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor simulate examples/desk/desk.toml --out recording")]
 pub(crate) struct Simulate {
     #[command(flatten)]
     run: RunArguments,

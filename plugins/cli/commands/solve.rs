@@ -11,13 +11,14 @@ use crate::output::{self, report};
 use crate::status::Status;
 use clap::Args;
 use manifactor::geometry::certify;
-use manifactor::solve::{All, Solution, solve};
+use manifactor::solve::{AllObservers, Solution, solve};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
 
 /// Solve a graph: a literal graph (.toml, .json, .yaml), a pose graph (.g2o, TORO) or bundle adjustment (.bal).
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor solve examples/03_relations/graph.toml --covariances")]
 pub(crate) struct Solve {
     /// The graph.
     graph: PathBuf,
@@ -47,11 +48,11 @@ impl Solve {
         let mut input = self.reading.open(&self.graph, &self.solver)?;
         input.notes.extend(self.what_if.apply(&mut input.graph, &input.values)?);
         for note in &input.notes {
-            output::note(note);
+            output::print_note(note);
         }
         let mut watch = Watch::new(verbose, "solving");
         let mut interrupt = interrupt::on_ctrl_c();
-        let mut observer = All(vec![&mut watch, &mut interrupt]);
+        let mut observer = AllObservers(vec![&mut watch, &mut interrupt]);
         let clock = Instant::now();
         let values = input.start.start(&input.graph, &input.values).map_err(Failure::input)?;
         let start = clock.elapsed().as_secs_f64();
@@ -83,12 +84,13 @@ impl Solve {
             if let Some(certificate) = certificate {
                 json["certificate"] = json!(certificate);
             }
-            output::json(&json);
+            output::print_json(&json);
         } else {
             let name = input.start.typetag_name();
             let start = format!("start {name} in {}\n", seconds(start));
             let certificate = certificate.map_or_else(String::new, |c| format!("{c}\n"));
-            let outcome = report::outcome(&solution.outcome) + &report::diagnosis(&diagnosis);
+            let outcome = report::outcome(&solution.outcome, verbose > 0)
+                + &report::diagnosis(&diagnosis, &solution.outcome, verbose > 0);
             let marginals = marginals.map_or_else(String::new, |m| report::marginals(&m));
             output::print(&(graph_file::summary(&input) + &start + &outcome + &certificate + &marginals));
         }
@@ -108,7 +110,7 @@ impl Solve {
             "termination": outcome.termination,
             "undetermined": outcome.undetermined,
             "moving": outcome.moving,
-            "untouched": outcome.untouched,
+            "untouched": outcome.unconstrained,
             "inactive": outcome.inactive,
             "inactive_factors": outcome.inactive_factors,
             "rejected": outcome.rejected,

@@ -16,7 +16,7 @@ where
     Box<K>: DeserializeOwned,
 {
     let chosen = |node| named(argument, name.unwrap_or(default), node, document);
-    let node = match section.take(field) {
+    let node = match section.optional_node(field) {
         Some(node) if name.is_none() && has_type(node) => node.clone(),
         Some(node) => chosen(node.clone()),
         None => {

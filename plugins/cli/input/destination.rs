@@ -47,7 +47,7 @@ impl Destination {
             (None, None) => return Err(no_format(path)),
         };
         write_whole(path, text.as_bytes()).map_err(Failure::at(path))?;
-        notes.iter().for_each(|note| output::note(note));
+        notes.iter().for_each(|note| output::print_note(note));
         Ok(())
     }
 }
@@ -61,11 +61,10 @@ fn refuse_to_replace(path: &Path, input: &Path) -> Result<(), Failure> {
     }
     let is_input =
         path.canonicalize().is_ok_and(|there| input.canonicalize().is_ok_and(|graph| graph == there));
-    let what =
-        if is_input { "is the graph itself, whose comments would be lost" } else { "is there already" };
+    let what = if is_input { "is the input graph, and its comments would be lost" } else { "exists already" };
     Err(Failure::with_help(
         format!("{} {what}", path.display()),
-        "choose another name, or write over it with --force",
+        "choose another name, or overwrite it with --force",
     ))
 }
 
@@ -82,7 +81,7 @@ fn no_format(path: &Path) -> Failure {
     extensions.extend(others.iter().map(String::as_str));
     let last = extensions.pop().unwrap_or_default();
     Failure::with_help(
-        format!("{}: the extension names no format that graphs are written in", path.display()),
+        format!("{}: graphs cannot be written in a format with this extension", path.display()),
         format!("use {} or {last}", extensions.join(", ")),
     )
 }

@@ -1,13 +1,14 @@
 //! Graphs in files, by extension.
 use crate::failure::Failure;
 use crate::input::document::Content;
+use crate::input::kind;
 use crate::input::solver::SolverArguments;
 use crate::output::text::count;
 use clap::{Args, ValueEnum};
 use manifactor::config::{Definitions, Document, Errors, Format, graph_root, read_graph_section};
 use manifactor::formats::{self, GraphFormat, GraphRead, InformationRepair};
 use manifactor::graph::{Graph, Values};
-use manifactor::smoother::Settings as Online;
+use manifactor::smoother::SmootherSettings as Online;
 use manifactor::solve::{Bytes, Optimizer, Start, available_memory, memory_limit};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -53,7 +54,7 @@ impl Reading {
     /// Reads a graph, and the solver and start that the file and the command line choose.
     pub(crate) fn open(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
         check_memory(path)?;
-        match Content::open(path)? {
+        match Content::open(path, kind::GRAPH)? {
             Content::Document(document) => literal(document, solver),
             Content::Graph(text, format) => self.plain(path, &text, format, solver),
         }
@@ -71,8 +72,8 @@ impl Reading {
         solver.apply(&mut settings)?;
         let errors = Errors::new();
         let chosen = settings.section(&errors).and_then(|mut section| {
-            let optimizer = solver.take(&mut section, settings.source());
-            let start = solver.take_start(&mut section, settings.source());
+            let optimizer = solver.read_solver(&mut section, settings.source());
+            let start = solver.read_start(&mut section, settings.source());
             let online = section.optional("online").unwrap_or_default();
             section.finish();
             Some((optimizer?, start?, online))
@@ -98,6 +99,13 @@ pub(crate) fn root(definitions: &mut Definitions) -> Value {
     let online = definitions.of::<Online>();
     if let Some(Value::Object(properties)) = root.get_mut("properties") {
         properties.insert("online".to_owned(), online);
+        for (field, docs) in
+            [("solver", "The solver. Default: auto."), ("start", "The initial values. Default: given.")]
+        {
+            if let Some(Value::Object(property)) = properties.get_mut(field) {
+                property.entry("description").or_insert_with(|| docs.into());
+            }
+        }
     }
     root
 }
@@ -108,8 +116,8 @@ pub(crate) fn literal(mut document: Document, solver: &SolverArguments) -> Resul
     let errors = Errors::new();
     let read = document.section(&errors).map(|mut section| {
         let (graph, values) = read_graph_section(&mut section);
-        let optimizer = solver.take(&mut section, document.source());
-        let start = solver.take_start(&mut section, document.source());
+        let optimizer = solver.read_solver(&mut section, document.source());
+        let start = solver.read_start(&mut section, document.source());
         let online = section.optional("online").unwrap_or_default();
         section.finish();
         Some(GraphFile { graph, values, optimizer: optimizer?, start: start?, online, notes: Vec::new() })
@@ -135,10 +143,10 @@ fn check_memory(path: &Path) -> Result<(), Failure> {
     let (needed, available) = (Bytes(needed), Bytes(available));
     Err(Failure::with_help(
         format!(
-            "{}: no memory for it: a graph of this size takes at least {needed}, and there are {available}",
+            "{}: not enough memory: a graph of this size needs at least {needed}, and {available} are available",
             path.display()
         ),
-        "allow more (ulimit -v), take fewer threads, or solve it in parts",
+        "raise the limit (ulimit -v), use fewer threads, or solve the graph in parts",
     ))
 }
 

@@ -12,12 +12,12 @@ use std::path::Path;
 
 /// Style of the pictures.
 #[derive(Debug, Clone, Copy, Args)]
-pub(crate) struct Look {
+pub(crate) struct PictureStyle {
     /// Width of the pictures in pixels of the SVG; a PNG has twice as many.
-    #[arg(long, value_name = "PIXELS", default_value_t = Look::default().size, value_parser = clap::value_parser!(u16).range(300..=4000))]
+    #[arg(long, value_name = "PIXELS", default_value_t = PictureStyle::default().size, value_parser = clap::value_parser!(u16).range(300..=4000))]
     size: u16,
     /// Colour theme of the pictures.
-    #[arg(long, value_enum, default_value_t = Look::default().theme)]
+    #[arg(long, value_enum, default_value_t = PictureStyle::default().theme)]
     theme: Shade,
 }
 
@@ -30,13 +30,13 @@ enum Shade {
     Dark,
 }
 
-impl Default for Look {
+impl Default for PictureStyle {
     fn default() -> Self {
         Self { size: 900, theme: Shade::Light }
     }
 }
 
-impl Look {
+impl PictureStyle {
     /// The width, in pixels of the SVG.
     pub(crate) fn width(self) -> f64 {
         self.size.into()
@@ -87,7 +87,7 @@ impl Look {
                 let pictures = run_pictures(record, variant, self.width());
                 drawn.pictures += pictures.len();
                 self.write(&out.join(&variant.folder), &pictures, |file| {
-                    watch.show(&format!("drawing {}/{file}", variant.folder));
+                    watch.show(&drawing(&variant.folder, file));
                     interrupt.poll()
                 })?
             };
@@ -98,6 +98,11 @@ impl Look {
         tracing::info!("all pictures are drawn");
         Ok(drawn)
     }
+}
+
+/// The progress while a file is drawn.
+fn drawing(folder: &str, file: &str) -> String {
+    format!("drawing {folder}/{file}")
 }
 
 /// Progress of the pictures of a run.
@@ -116,7 +121,7 @@ impl Drawn {
         let out = out.display();
         (!variants.is_empty()).then(|| {
             format!(
-                "interrupted: pictures of {} are missing, or those of an earlier run; `manifactor plot {out}` draws them",
+                "interrupted: some pictures of {} are missing or from an earlier run; `manifactor plot {out}` draws them",
                 variants.join(", ")
             )
         })
@@ -142,11 +147,28 @@ mod tests {
             flag.store(file == "latency.png", std::sync::atomic::Ordering::Relaxed);
             flow
         };
-        assert!(!Look::default().write(folder.path(), &[picture, other], goes_on).unwrap());
+        assert!(!PictureStyle::default().write(folder.path(), &[picture, other], goes_on).unwrap());
         let files = std::fs::read_dir(folder.path()).unwrap();
         let mut files: Vec<_> = files.map(|file| file.unwrap().file_name()).collect();
         files.sort_unstable();
         assert_eq!(files, ["latency.png", "latency.svg"]);
+    }
+
+    #[test]
+    fn the_bar_shows_the_file_that_is_drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        let picture = latencies("latency", &[0.1, 0.2], 300.0).unwrap();
+        let bar = indicatif::ProgressBar::hidden();
+        let mut watch = Watch::Bar(bar.clone());
+        let mut shown = vec![];
+        let style = PictureStyle::default();
+        let is_complete = style.write(folder.path(), &[picture], |file| {
+            watch.show(&drawing("boxes", file));
+            shown.push(bar.message());
+            ControlFlow::Continue(())
+        });
+        assert!(is_complete.unwrap());
+        assert_eq!(shown, ["drawing boxes/latency.svg", "drawing boxes/latency.png"]);
     }
 
     #[test]
@@ -155,7 +177,7 @@ mod tests {
         assert_eq!(Drawn { pictures: 8, missing: vec![] }.message(out), None);
         let text = Drawn { pictures: 8, missing: vec!["a".to_owned(), "b".to_owned()] }.message(out).unwrap();
         assert!(
-            text.contains("pictures of a, b are missing") && text.contains("`manifactor plot out`"),
+            text.contains("some pictures of a, b are missing") && text.contains("`manifactor plot out`"),
             "{text}"
         );
     }

@@ -1,6 +1,6 @@
 //! Arguments for the document of a run.
 use crate::failure::Failure;
-use crate::input::document;
+use crate::input::{document, kind};
 use clap::Args;
 use manifactor::config::Document;
 use manifactor::slam::run_document::RunDocument;
@@ -22,7 +22,7 @@ pub(crate) struct RunArguments {
 impl RunArguments {
     /// Reads the document.
     pub(crate) fn open(&self) -> Result<RunDocument, Failure> {
-        self.read(document::open(&self.config)?)
+        self.read(document::open(&self.config, kind::RUN)?)
     }
 
     /// Reads a document that is already open.

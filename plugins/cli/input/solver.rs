@@ -8,8 +8,9 @@ use manifactor::solve::{Optimizer, Start};
 /// `--solver`, `--start` and `--set`.
 #[derive(Debug, Args)]
 pub(crate) struct SolverArguments {
-    /// The solver, one of `manifactor list solvers`, with its default settings; `--set` still applies.
-    #[arg(long, value_name = "NAME")]
+    /// The solver, one of `manifactor list solvers`, with its default settings; `--set` still applies. Short
+    /// names: `lm` for levenberg_marquardt, `gn` for gauss_newton, `dl` for dogleg.
+    #[arg(long, value_name = "NAME", value_parser = full_name)]
     solver: Option<String>,
     /// The initial values, one of `manifactor list starts`. Default: the values in the graph.
     #[arg(long, value_name = "NAME")]
@@ -18,6 +19,17 @@ pub(crate) struct SolverArguments {
     /// `factors[2].noise.sigma=0.1`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+}
+
+/// Short names of solvers, with the names in the catalogue.
+const SHORT_NAMES: [(&str, &str); 3] =
+    [("lm", "levenberg_marquardt"), ("gn", "gauss_newton"), ("dl", "dogleg")];
+
+/// Returns the name in the catalogue for the name of a solver on the command line.
+#[expect(clippy::unnecessary_wraps, reason = "the form of a parser of arguments")]
+fn full_name(name: &str) -> Result<String, String> {
+    let short = SHORT_NAMES.iter().find(|(short, _)| short.eq_ignore_ascii_case(name));
+    Ok(short.map_or(name, |(_, full)| full).to_owned())
 }
 
 impl SolverArguments {
@@ -37,7 +49,7 @@ impl SolverArguments {
     }
 
     /// Reads the field `solver` of a document's table. Default: `auto`.
-    pub(crate) fn take(
+    pub(crate) fn read_solver(
         &self,
         section: &mut Section<'_>,
         document: &SourceText,
@@ -47,11 +59,26 @@ impl SolverArguments {
     }
 
     /// Reads the field `start` of a document's table. Default: the values in the graph.
-    pub(crate) fn take_start(
+    pub(crate) fn read_start(
         &self,
         section: &mut Section<'_>,
         document: &SourceText,
     ) -> Option<Box<dyn Start>> {
         choose(section, "start", ("--start", self.start.as_deref()), "given", document)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SHORT_NAMES, full_name};
+    use manifactor::graph::catalogue::find;
+
+    #[test]
+    fn short_names_stand_for_registered_solvers_and_hide_none() {
+        for (short, full) in SHORT_NAMES {
+            assert!(find("solver", full).is_some() && find("solver", short).is_none(), "{short}: {full}");
+            assert_eq!(full_name(&short.to_uppercase()).as_deref(), Ok(full));
+        }
+        assert_eq!(full_name("auto").as_deref(), Ok("auto"));
     }
 }

@@ -1,5 +1,6 @@
 //! Variations of a graph: fixed variables and omitted factors.
 use crate::failure::Failure;
+use crate::output::text::count;
 use clap::Args;
 use manifactor::config::nearest;
 use manifactor::graph::{Graph, Values};
@@ -22,14 +23,14 @@ impl WhatIf {
         let mut notes = vec![];
         for key in &self.freeze {
             freeze(graph, values, key)?;
-            notes.push(format!("held {key}"));
+            notes.push(format!("fixed {key}"));
         }
         let mut dropped = vec![false; graph.factors().len()];
         for which in &self.drop {
             let before = dropped.iter().filter(|d| **d).count();
             mark(graph, which, &mut dropped)?;
             let n = dropped.iter().filter(|d| **d).count() - before;
-            notes.push(format!("left out {n} by `{which}`"));
+            notes.push(format!("omitted {} by `--drop {which}`", count(n, "factor")));
         }
         let mut places = dropped.iter();
         graph.factors_mut().retain(|_| !places.next().copied().unwrap_or(false));
@@ -48,7 +49,7 @@ fn freeze(graph: &mut Graph, values: &Values, key: &str) -> Result<(), Failure> 
         let names = values.iter().map(|(key, _)| key.as_str());
         let meant = nearest(key, names).map(|k| format!("did you mean `{k}`? ")).unwrap_or_default();
         let help = format!("{meant}expected a key of the graph, or a key and a direction such as `q0.log_a`");
-        return Err(Failure::with_help(format!("--freeze {key}: no variable is called so"), help));
+        return Err(Failure::with_help(format!("--freeze {key}: the graph has no such variable"), help));
     };
     let tangent = variable.erased().tangent();
     if !tangent.contains(&direction) {
@@ -65,11 +66,14 @@ fn freeze(graph: &mut Graph, values: &Values, key: &str) -> Result<(), Failure> 
 }
 
 fn mark(graph: &Graph, which: &str, dropped: &mut [bool]) -> Result<(), Failure> {
-    let count = dropped.len();
+    let factors = dropped.len();
     if let Ok(number) = which.parse::<usize>() {
         let Some(place) = dropped.get_mut(number) else {
-            let what = format!("--drop {which}: the graph has {count} factors");
-            return Err(Failure::with_help(what, "they are counted from 0; `manifactor graph` lists them"));
+            let what = format!("--drop {which}: the graph has {}", count(factors, "factor"));
+            return Err(Failure::with_help(
+                what,
+                "factors are numbered from 0; `manifactor graph` lists them",
+            ));
         };
         *place = true;
         return Ok(());
@@ -79,7 +83,7 @@ fn mark(graph: &Graph, which: &str, dropped: &mut [bool]) -> Result<(), Failure>
         let meant = nearest(which, names()).map(|n| format!("did you mean `{n}`? ")).unwrap_or_default();
         let help = format!("{meant}expected a number or a type, as `manifactor graph` lists them");
         return Err(Failure::with_help(
-            format!("--drop {which}: no factor of that type is in the graph"),
+            format!("--drop {which}: the graph has no factor of this type"),
             help,
         ));
     }

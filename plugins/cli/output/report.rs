@@ -1,9 +1,11 @@
 //! The result of a solve as text.
 use crate::output::text::{self, Table, count, list, seconds};
-use manifactor::solve::{AtStart, Diagnosis, FactorCost, InactiveFactor, Marginal, Outcome, Weak};
+use manifactor::solve::{
+    Diagnosis, FactorCost, InactiveFactor, Marginal, Outcome, StartDiagnosis, WeakDirection,
+};
 
-/// The outcome in a few lines: termination, cost and times.
-pub(crate) fn outcome(outcome: &Outcome) -> String {
+/// The outcome in a few lines: termination, cost and time. `details` adds the time of each stage.
+pub(crate) fn outcome(outcome: &Outcome, details: bool) -> String {
     let times = &outcome.times;
     let mut out = format!("{}\n", outcome.termination);
     out += &format!(
@@ -27,6 +29,9 @@ pub(crate) fn outcome(outcome: &Outcome) -> String {
         let keys = outcome.rejected.iter().map(|r| format!("{} ({})", r.factor, text::keys(&r.keys)));
         out += &format!("{rejected} of {all} rejected as outliers: {}\n", list(keys));
     }
+    if !details {
+        return out + &format!("{}\n", seconds(times.total));
+    }
     out += &format!(
         "{}: compile {}, linearize {}, factorize {}, solve {}, evaluate {}, other {}\n",
         seconds(times.total),
@@ -45,7 +50,7 @@ fn inactive(inactive: usize, factors: usize, first: &[InactiveFactor]) -> String
     let named: Vec<_> = first.iter().map(factor).collect();
     let more = if inactive > named.len() { ", …" } else { "" };
     let (all, named) = (count(factors, "factor"), named.join(", "));
-    format!("{inactive} of {all} are not defined at these values and take no part: {named}{more}")
+    format!("{inactive} of {all} are undefined at these values and are left out: {named}{more}")
 }
 
 /// `3 between_se2 (x0, x1)`: index, type and variables of a factor.
@@ -54,38 +59,48 @@ fn factor(factor: &InactiveFactor) -> String {
 }
 
 /// Findings at the initial values, one per line.
-pub(crate) fn at_start(found: &AtStart, factors: usize) -> Vec<String> {
+pub(crate) fn at_start(found: &StartDiagnosis, factors: usize) -> Vec<String> {
     let mut lines = vec![];
     if let Some(bad) = &found.not_finite {
-        lines.push(format!("factor {} is not finite at these values: begin elsewhere", factor(bad)));
+        lines.push(format!(
+            "factor {} is not finite at these values: choose other initial values",
+            factor(bad)
+        ));
     }
     if found.inactive > 0 {
         lines.push(inactive(found.inactive, factors, &found.inactive_factors));
     }
-    lines.extend(found.untouched.iter().map(ToString::to_string));
+    lines.extend(found.unconstrained.iter().map(ToString::to_string));
     lines.extend(found.undetermined.iter().map(|open| format!("at these values, {open}")));
-    if let Some(Weak { condition, direction }) = &found.weak {
+    if let Some(WeakDirection { condition, direction }) = &found.weak {
         lines.push(format!(
-            "at these values, next to {direction}: the condition number is {condition:.0e}, so about {:.0} of 16 digits are lost",
+            "at these values, almost {direction}: the condition number is {condition:.0e}, so about {:.0} of 16 \
+             digits are lost",
             condition.log10()
         ));
     }
     lines
 }
 
-/// The factors with the largest cost, and the condition of the linear system.
-pub(crate) fn diagnosis(diagnosis: &Diagnosis) -> String {
-    let condition = match diagnosis.condition {
-        Some(condition) => format!("condition {condition:.1e}"),
-        None => "condition infinite, or not estimated: H could not be factorized, or is large".to_owned(),
-    };
-    let open = diagnosis.undetermined.as_ref();
+/// A warning about undetermined directions at the estimate, unless the outcome has one already. `details`
+/// adds the condition number and the factors with the largest cost.
+pub(crate) fn diagnosis(diagnosis: &Diagnosis, outcome: &Outcome, details: bool) -> String {
+    let open = diagnosis.undetermined.as_ref().filter(|_| outcome.undetermined.is_none());
     let open = open.map_or_else(String::new, |open| format!("warning: at the estimate {open}\n"));
-    let condition = format!("{open}{condition} (of H with ones on its diagonal)\n");
+    if !details {
+        return open;
+    }
+    let condition = match diagnosis.condition {
+        Some(condition) => format!("condition number {condition:.1e}"),
+        None => {
+            "condition number infinite, or not estimated because H is large or was not factorized".to_owned()
+        }
+    };
+    let condition = format!("{open}{condition} (of H, scaled to a unit diagonal)\n");
     if diagnosis.worst.is_empty() {
         return condition;
     }
-    let mut table = Table::of_numbers(&["costs the most", "cost", "weight", "residual"]);
+    let mut table = Table::of_numbers(&["largest costs", "cost", "weight", "residual"]);
     for FactorCost { factor, name, keys, residual, cost, weight } in &diagnosis.worst {
         let residual: Vec<_> = residual.iter().map(|x| format!("{x:.3}")).collect();
         let name = format!("{factor} {name} ({})", text::keys(keys));

@@ -13,7 +13,7 @@ pub(crate) fn of(summary: &ExperimentSummary) -> String {
         .collect();
     let labels: Vec<&str> = header.iter().take(summary.columns.len()).copied().collect();
     let kept: Vec<&str> = labels.iter().copied().chain(summary.metrics.iter().map(String::as_str)).collect();
-    let mut table = Table::of_numbers(&header).keeping(&kept).naming(labels.len());
+    let mut table = Table::of_numbers(&header).with_priority(&kept).with_name_columns(labels.len());
     for group in &summary.groups {
         let mean = |metric| group.means.get(metric).map_or("-".into(), |mean| format!("{:.5}", mean.mean));
         let counts = [group.trials.to_string(), group.failed.to_string()];
@@ -22,7 +22,7 @@ pub(crate) fn of(summary: &ExperimentSummary) -> String {
             let compared = |metric| group.comparisons.get(metric).map_or("-".into(), ToString::to_string);
             let pairs = group.comparisons.values().map(|c| c.pairs).max().unwrap_or_default();
             let mut row = vec![String::new(); group.labels.len() + 2];
-            row[0] = "  less the baseline".into();
+            row[0] = "  minus the baseline".into();
             row[group.labels.len()] = pairs.to_string();
             table.row(row.into_iter().chain(summary.metrics.iter().map(compared)));
         }
@@ -30,4 +30,4 @@ pub(crate) fn of(summary: &ExperimentSummary) -> String {
     format!("{}\n{}\n{}\n", on_one_line(&summary.title), table.text(), wrap(NOTE))
 }
 
-const NOTE: &str = "Means over trials; differences of pairs of trials, with the bootstrap's 95 % interval.";
+const NOTE: &str = "Means over trials, and mean differences of paired trials with 95 % bootstrap intervals.";

@@ -5,11 +5,12 @@ use manifactor::slam::report::{ClusteredMean, Prediction, RunReport, TrajectoryR
 use manifactor::slam::sequence::ObjectId;
 use manifactor::slam::variance::{BoxComponent, CrossValidationScore, MotionComponent};
 
-/// The result of a run, as a table and a few lines.
-pub(crate) fn of_run(report: &RunReport) -> String {
+/// The result of a run, as a table and a few lines. `details` adds the estimated noise, and the condition
+/// number and the factor with the largest cost of each variant.
+pub(crate) fn of_run(report: &RunReport, details: bool) -> String {
     let header =
         ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "iterations", "time"];
-    let mut table = Table::of_numbers(&header).keeping(&KEPT);
+    let mut table = Table::of_numbers(&header).with_priority(&PRIORITY);
     if let Some(first) = report.variants.first() {
         table.row(before(first));
     }
@@ -19,7 +20,7 @@ pub(crate) fn of_run(report: &RunReport) -> String {
     let mut out = format!("{}\n{}\n", on_one_line(&report.title), table.text());
     if let Some(alignment) = report.variants.iter().find_map(|v| v.row().alignment) {
         let line = format!(
-            "ATE: RMSE of the camera's positions, aligned by {alignment}, over {}.",
+            "ATE: RMSE of the camera positions, aligned by {alignment}, over {}.",
             poses_covered(&report.variants)
         );
         out += &(text::wrap(&line) + "\n");
@@ -34,18 +35,17 @@ pub(crate) fn of_run(report: &RunReport) -> String {
         }
     }
     if report.variants.iter().any(|v| !v.row().converged) {
-        out += "!: ended without converging; a warning below says how.\n";
+        out += "!: the solve did not converge; see the warning below.\n";
     }
     for variant in &report.variants {
         out += &association(variant);
-        out += &noise(variant);
+        out += &if details { noise(variant) } else { String::new() };
         out += &held_out(variant);
         out += &prior_map(variant);
-        out += &gone(variant);
+        out += &removed(variant);
         out += &stream(variant);
-    }
-    for variant in &report.variants {
-        out += &diagnosis(variant);
+        out += &rejected(variant);
+        out += &if details { diagnosis(variant) } else { String::new() };
     }
     for variant in &report.variants {
         for warning in &variant.warnings {
@@ -73,11 +73,12 @@ fn over(trajectory: &TrajectoryReport) -> String {
 }
 
 /// Explanation of the columns about objects.
-const LANDMARKS: &str = "Position, shape, quality of the objects against the truth: RMSE of the centres; mean Jaccard distance \
-                         of the boxes around them, centred and where they stand: 0 is perfect, 1 is no overlap.";
+const LANDMARKS: &str = "Errors of the objects against the truth. Position: RMSE of the centres. Shape: mean Jaccard distance of \
+                         their bounding boxes with equal centres (0: equal, 1: no overlap). Quality: the same with the estimated \
+                         centres.";
 
 /// Columns that a narrow terminal shows first.
-const KEPT: [&str; 7] = ["ATE (m)", "position (m)", "shape", "quality", "cost", "iterations", "objects"];
+const PRIORITY: [&str; 7] = ["ATE (m)", "position (m)", "shape", "quality", "cost", "iterations", "objects"];
 
 /// For a run frame by frame: the latencies, and the map after the last frame.
 fn stream(variant: &VariantReport) -> String {
@@ -85,7 +86,8 @@ fn stream(variant: &VariantReport) -> String {
     let name = on_one_line(&variant.name);
     let [p50, p99, max] = [online.latencies.p50, online.latencies.p99, online.latencies.max].map(seconds);
     let mut text = format!(
-        "{name}: {} as they came, p50 {p50}, p99 {p99}, at most {max}; {} born, {} withdrawn, cost {:.3} after the last",
+        "{name}: {} processed as they arrived, latency p50 {p50}, p99 {p99}, max {max}; {} added, {} removed; cost {:.3} after \
+         the last frame",
         text::count(online.seconds.len(), "frame"),
         text::count(online.initialized, "object"),
         online.removed,
@@ -93,10 +95,10 @@ fn stream(variant: &VariantReport) -> String {
     );
     if let Some(trajectory) = online.trajectory.first() {
         let ate = metres(trajectory.estimate.ate.rmse);
-        text += &format!(", ATE of poses as their frames came {ate} m over {}", over(trajectory));
+        text += &format!(", ATE of the poses at the time of their frames {ate} m over {}", over(trajectory));
     }
     if online.refusals > 0 {
-        text += &format!(", {} refused", text::count(online.refusals, "frame or change"));
+        text += &format!(", {} rejected", text::count(online.refusals, "frame or change"));
     }
     text::wrap(&text) + "\n"
 }
@@ -106,14 +108,14 @@ fn association(variant: &VariantReport) -> String {
     let Some(association) = &variant.association else { return String::new() };
     let merged = text::count(association.merged, "object");
     let mut line = format!(
-        "{}: boxes put to objects by {}, {merged} merged, {} moved",
+        "{}: data association by {}, {merged} merged, {} reassigned",
         on_one_line(&variant.name),
         association.by,
         text::count(association.moved, "box")
     );
     if let (Some(then), Some(end)) = (&association.at_the_time, &association.in_the_end) {
         line += &format!(
-            "; pairwise F1 {:.3} at the time, {:.3} in the end (precision {:.3}, recall {:.3}), {} of 3 boxes or more for {} true ones",
+            "; pairwise F1 {:.3} at arrival, {:.3} at the end (precision {:.3}, recall {:.3}); {} with 3 boxes or more, {} true objects",
             then.f1,
             end.f1,
             end.precision,
@@ -134,16 +136,23 @@ fn noise(variant: &VariantReport) -> String {
         let MotionComponent { rotation, translation, pivot } = choice.noise;
         let about = if pivot > 0.0 { format!(" about {pivot:.2} m ahead") } else { String::new() };
         parts.push(if choice.keeps_input() {
-            format!("odometry kept: the best correction changes what boxes of other objects cost by {cost:+.1} ± {deviation:.1}")
+            format!("odometry noise kept: the best change alters the cross-validated cost of boxes by {cost:+.1} ± {deviation:.1}")
         } else {
-            format!("odometry σ {rotation:.1e} rad, {translation:.1e} m{about}: boxes of other objects cost {cost:+.1} ± {deviation:.1}")
+            format!(
+                "odometry σ {rotation:.1e} rad, {translation:.1e} m{about}: cross-validated cost of boxes {cost:+.1} ± {deviation:.1}"
+            )
         });
     }
     parts.extend(found.boxes.iter().map(|(name, boxes)| {
         let BoxComponent { sigma_px, of_size, correlation_time, .. } = boxes;
-        let grows =
-            if *of_size > 0.0 { format!(" and {:.1} % of the size", 100.0 * of_size) } else { String::new() };
-        format!("boxes ({name}) σ {sigma_px:.1} px{grows}, {correlation_time:.1} of them worth one")
+        let grows = if *of_size > 0.0 {
+            format!(" plus {:.1} % of the size", 100.0 * of_size)
+        } else {
+            String::new()
+        };
+        format!(
+            "boxes ({name}) σ {sigma_px:.1} px{grows}, {correlation_time:.1} consecutive boxes count as one"
+        )
     }));
     text::wrap(&format!("{}: {}", on_one_line(&variant.name), parts.join("; "))) + "\n"
 }
@@ -157,7 +166,7 @@ fn held_out(variant: &VariantReport) -> String {
         format!("{:.digits$}{error}", mean.mean)
     };
     let line = format!(
-        "{}: boxes held out {} of {}: IoU {}, {} px; {out_of_view} predicted out of view, {} of objects not mapped",
+        "{}: {} held-out boxes of {}: IoU {}, error {} px; {out_of_view} predicted out of view, {} of objects not in the map",
         on_one_line(&variant.name),
         boxes,
         text::count(objects, "object"),
@@ -173,13 +182,13 @@ fn keys(objects: &[ObjectId]) -> String {
 }
 
 /// Objects that the run itself added and later found removed.
-fn gone(variant: &VariantReport) -> String {
+fn removed(variant: &VariantReport) -> String {
     let of_prior = variant.prior_map.as_ref().map_or(&[][..], |prior| &prior.gone);
     let own: Vec<ObjectId> = variant.gone.iter().copied().filter(|id| !of_prior.contains(id)).collect();
     if own.is_empty() {
         return String::new();
     }
-    text::wrap(&format!("{}: seen, and gone at the end: {}", on_one_line(&variant.name), keys(&own))) + "\n"
+    text::wrap(&format!("{}: removed objects: {}", on_one_line(&variant.name), keys(&own))) + "\n"
 }
 
 /// Objects of the prior map: seen again, removed, and newly added.
@@ -189,14 +198,14 @@ fn prior_map(variant: &VariantReport) -> String {
     };
     let found = prior.found.as_ref().map(|found| {
         let matches = text::count(found.located.matches.len(), "object");
-        format!(" found after {} by {matches},", text::count(found.frame + 1, "frame"))
+        format!(" relocalized after {} by {matches},", text::count(found.frame + 1, "frame"))
     });
     let gone = match prior.gone.as_slice() {
-        [] => "none gone".to_owned(),
-        gone => format!("gone are {}", keys(gone)),
+        [] => "none removed".to_owned(),
+        gone => format!("removed: {}", keys(gone)),
     };
     let line = format!(
-        "{}: in {},{} {} of {} seen again, {gone}, {} added",
+        "{}: prior map {},{} {} of {} detected again, {gone}, {} added",
         on_one_line(&variant.name),
         prior.file.display(),
         found.unwrap_or_default(),
@@ -207,21 +216,26 @@ fn prior_map(variant: &VariantReport) -> String {
     text::wrap(&line) + "\n"
 }
 
-/// One line: the condition, the rejected factors, and the factor with the largest cost. The report has the
-/// whole table.
+/// The number of factors that were rejected as outliers.
+fn rejected(variant: &VariantReport) -> String {
+    if variant.solve.rejected.is_empty() {
+        return String::new();
+    }
+    let factors = text::count(variant.solve.rejected.len(), "factor");
+    text::wrap(&format!("{}: {factors} rejected as outliers", on_one_line(&variant.name))) + "\n"
+}
+
+/// The condition number and the factor with the largest cost. The report has the ten largest.
 fn diagnosis(variant: &VariantReport) -> String {
     let Some(diagnosis) = &variant.solve.diagnosis else { return String::new() };
     let name = on_one_line(&variant.name);
     let mut line = match diagnosis.condition {
-        Some(condition) => format!("{name}: condition {condition:.1e}"),
-        None => format!("{name}: condition infinite or unknown"),
+        Some(condition) => format!("{name}: condition number {condition:.1e}"),
+        None => format!("{name}: condition number infinite or unknown"),
     };
-    if !variant.solve.rejected.is_empty() {
-        line += &format!(", {} rejected as outliers", text::count(variant.solve.rejected.len(), "factor"));
-    }
     if let Some(worst) = diagnosis.worst.first() {
         let (name, keys) = (&worst.name, text::keys(&worst.keys));
-        line += &format!(", costs the most: factor {} {name} ({keys}) with {:.3}", worst.factor, worst.cost);
+        line += &format!("; largest cost {:.3}, of factor {} {name} ({keys})", worst.cost, worst.factor);
     }
     text::wrap(&line) + "\n"
 }

@@ -77,9 +77,9 @@ impl Observer for Watch {
             }
             Self::Lines { begun } => {
                 if !std::mem::replace(begun, true) {
-                    output::say(HEADER);
+                    output::print_message(HEADER);
                 }
-                output::say(&line(record));
+                output::print_message(&line(record));
             }
         }
         ControlFlow::Continue(())

@@ -46,7 +46,7 @@ impl Answers {
     /// Returns the response to a request. Its body is ignored.
     pub(super) fn to<T>(&self, request: &Request<T>) -> Response<Body> {
         if !self.access.admits(request) {
-            return words(StatusCode::FORBIDDEN, "open the address as it was told");
+            return words(StatusCode::FORBIDDEN, "open the complete address that the command printed");
         }
         match (request.method(), request.uri().path()) {
             (&Method::GET, "/") => {

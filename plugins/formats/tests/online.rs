@@ -5,7 +5,7 @@ use manifactor_geometry::{Between, Point2, Range, Se2, Se3};
 use manifactor_graph::checked::{NotNegative, Positive};
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
-use manifactor_smoother::{Report, Session, Settings, Span, Window};
+use manifactor_smoother::{Smoother, SmootherSettings, Span, UpdateReport, Window};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent, solve};
 use nalgebra::{Vector2, Vector3};
 use std::num::NonZeroUsize;
@@ -21,9 +21,9 @@ fn data(path: &str) -> Option<PathBuf> {
 }
 
 /// Runs at most this number of steps, and returns the smoother and its last report.
-fn replay(graph: &Graph, most: usize) -> (Session, Report) {
-    let mut session = Session::new(Settings::default());
-    let (mut steps, mut report) = (GraphReplay::of(graph, &Values::new()), Report::default());
+fn replay(graph: &Graph, most: usize) -> (Smoother, UpdateReport) {
+    let mut session = Smoother::new(SmootherSettings::default());
+    let (mut steps, mut report) = (GraphReplay::of(graph, &Values::new()), UpdateReport::default());
     for _ in 0..most {
         let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
         session.push(&step.factors, &step.values).unwrap();
@@ -41,7 +41,10 @@ fn the_estimate_is_close_to_the_optimum_and_finish_is_there() {
         let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
         let graph = pose_graph::read(path, &PoseGraphOptions::default()).unwrap().graph;
         let (mut session, report) = replay(&graph, most);
-        assert!(report.parked.is_empty() && report.undetermined.is_empty(), "{name}: {report:?}");
+        assert!(
+            report.undetermined_variables.is_empty() && report.undetermined_directions.is_empty(),
+            "{name}: {report:?}"
+        );
         let finished = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap();
         let (cost, best) = (session.cost(), finished.outcome.final_cost);
         assert!(cost <= best * (1.0 + above), "{name}: {cost}, the optimum is {best}");
@@ -83,11 +86,12 @@ fn a_replay_goes_on_after_a_restart_bit_for_bit() {
     for name in ["intel", "parking-garage", "input_M3500_g2o"] {
         let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
         let PoseGraph { graph, values, .. } = pose_graph::read(path, &PoseGraphOptions::default()).unwrap();
-        let (mut steps, mut session) = (GraphReplay::of(&graph, &values), Session::new(Settings::default()));
+        let (mut steps, mut session) =
+            (GraphReplay::of(&graph, &values), Smoother::new(SmootherSettings::default()));
         let mut other = None;
         for n in 0..400 {
             let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
-            let next = |session: &mut Session| {
+            let next = |session: &mut Smoother| {
                 session.push(&step.factors, &step.values).unwrap();
                 session.update().unwrap()
             };
@@ -96,7 +100,7 @@ fn a_replay_goes_on_after_a_restart_bit_for_bit() {
                 assert_eq!(next(other), report, "{name}, pose {n}");
             }
             if n == 237 {
-                other = Some(Session::load(&session.save().unwrap()).unwrap());
+                other = Some(Smoother::load(&session.save().unwrap()).unwrap());
             }
         }
         let (text, other) = (session.save().unwrap(), other.unwrap());
@@ -111,7 +115,7 @@ fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
     let PoseGraph { graph, values, .. } = pose_graph::read(path, &PoseGraphOptions::default()).unwrap();
     let run = |budget: Option<f64>| {
         let budget = budget.map(NotNegative::literal);
-        let mut session = Session::new(Settings { budget, ..Settings::default() });
+        let mut session = Smoother::new(SmootherSettings { budget, ..SmootherSettings::default() });
         let (mut steps, mut reports) = (GraphReplay::of(&graph, &values), vec![]);
         for _ in 0..1000 {
             let step = steps.step(|key| session.estimate(key)).unwrap().unwrap();
@@ -123,7 +127,7 @@ fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
     let (mut free, of_free) = run(None);
     let budget = 2e4;
     let (mut bounded, of_bounded) = run(Some(budget));
-    let most = |reports: &[Report]| {
+    let most = |reports: &[UpdateReport]| {
         // The budget covers neither the work for new factors nor steps that had to be shortened.
         let relinearizing = reports.iter().filter(|r| r.relinearized > 0 && r.halved + r.damped == 0);
         relinearizing.map(|r| r.operations).fold(0.0, f64::max)
@@ -149,8 +153,8 @@ fn a_window_that_holds_all_closures_is_as_good_as_all() {
     let Some(path) = data("g2o/sphere2500.g2o") else { return };
     let PoseGraph { graph, values, .. } = pose_graph::read(path, &PoseGraphOptions::default()).unwrap();
     let window = Some(Window::from(Span::Poses(NonZeroUsize::new(120).unwrap())));
-    let mut narrow = Session::new(Settings { window, ..Settings::default() });
-    let (mut all, mut steps) = (Session::new(Settings::default()), GraphReplay::of(&graph, &values));
+    let mut narrow = Smoother::new(SmootherSettings { window, ..SmootherSettings::default() });
+    let (mut all, mut steps) = (Smoother::new(SmootherSettings::default()), GraphReplay::of(&graph, &values));
     let mut bytes = vec![];
     for n in 0..500 {
         let step = steps.step(|key| all.estimate(key)).unwrap().unwrap();
@@ -187,7 +191,7 @@ fn antennas_wait_for_a_second_range() {
         return;
     };
     let (odometry, ranges) = (rows(odometry), rows(ranges));
-    let mut session = Session::new(Settings::default());
+    let mut session = Smoother::new(SmootherSettings::default());
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("x0", Se2::identity());
     graph.fix("x0");
@@ -217,8 +221,12 @@ fn antennas_wait_for_a_second_range() {
         graph.add([here.clone(), antenna], range).noise(Noise::sigma(0.5).unwrap()).loss(Cauchy::default());
         session.push(&graph, &values).unwrap();
         let report = session.update().unwrap();
-        assert!(report.parked.iter().all(|key| key.as_str().starts_with('l')), "{:?}", report.parked);
-        waited += report.parked.len();
+        assert!(
+            report.undetermined_variables.iter().all(|key| key.as_str().starts_with('l')),
+            "{:?}",
+            report.undetermined_variables
+        );
+        waited += report.undetermined_variables.len();
         pose = session.get(here.as_str()).unwrap();
     }
     assert!(waited > 0, "an antenna that is heard once is not known");

@@ -2,7 +2,9 @@
 use manifactor_formats::pose_graph::{self, PoseGraphOptions};
 use manifactor_geometry::{Chordal, SpanningTree, Tree, certify};
 use manifactor_graph::Graph;
-use manifactor_solve::{GaussNewton, Given, LevenbergMarquardt, Optimizer, Silent, Solution, Start, solve};
+use manifactor_solve::{
+    GaussNewton, GivenStart, LevenbergMarquardt, Optimizer, Silent, Solution, Start, solve,
+};
 
 /// Graph and solution; prints a note and returns `None` without data.
 fn solved(file: &str, start: &dyn Start, optimizer: &dyn Optimizer) -> Option<(Graph, Solution)> {
@@ -95,7 +97,7 @@ fn the_best_known_costs_are_certified_and_where_noise_is_isotropic_bounded() {
 #[test]
 fn a_minimum_that_is_not_the_best_is_not_certified() {
     // From the values in the file, other programs end at 385.12.
-    let Some((graph, solution)) = solved("MIT.g2o", &Given {}, &GaussNewton::default()) else {
+    let Some((graph, solution)) = solved("MIT.g2o", &GivenStart {}, &GaussNewton::default()) else {
         return;
     };
     let (reached, best) = (solution.outcome.final_cost, GRAPHS[1].1);

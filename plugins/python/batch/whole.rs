@@ -84,7 +84,7 @@ impl Batch for Whole {
     fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool {
         self.inner.fits(noise, loss)
     }
-    fn takes(&self, factor: &dyn Any) -> bool {
+    fn accepts_parameters(&self, factor: &dyn Any) -> bool {
         factor.downcast_ref::<Batched>().is_some_and(|factor| Arc::ptr_eq(factor.function(), &self.function))
     }
     fn reserve(&mut self, factors: usize, variables: usize) {
@@ -154,8 +154,8 @@ impl Batch for Whole {
     fn set_weight(&mut self, index: usize, weight: f64) {
         self.inner.set_weight(index, weight);
     }
-    fn hold(&mut self, index: usize, starts: &[u32], held: &[u32]) {
-        self.inner.hold(index, starts, held);
+    fn set_fixed(&mut self, index: usize, starts: &[u32], held: &[u32]) {
+        self.inner.set_fixed(index, starts, held);
     }
     fn is_active(&self, index: usize) -> bool {
         self.inner.is_active(index)

@@ -8,12 +8,12 @@ use std::sync::Arc;
 #[derive(Default)]
 pub(crate) struct Shared<T> {
     inner: Arc<T>,
-    /// Owner of an immutable object: "solution" or "session".
+    /// Owner of an immutable object: "solution" or "smoother".
     owner: Option<&'static str>,
 }
 
 impl<T: Clone> Shared<T> {
-    /// Creates an immutable object that belongs to a solution or a session.
+    /// Creates an immutable object that belongs to a solution or a smoother.
     pub(crate) fn of(owner: &'static str, inner: impl Into<Arc<T>>) -> Self {
         Self { inner: inner.into(), owner: Some(owner) }
     }
@@ -31,7 +31,7 @@ impl<T: Clone> Shared<T> {
     /// Returns the content for a change.
     ///
     /// # Errors
-    /// If it belongs to a solution or a session.
+    /// If it belongs to a solution or a smoother.
     pub(crate) fn change(&mut self, what: &str) -> PyResult<&mut T> {
         match self.owner {
             None => Ok(Arc::make_mut(&mut self.inner)),

@@ -17,7 +17,7 @@ from __future__ import annotations
 import os
 
 from . import errors, factors, functions, losses, solvers, starts, types, variables
-from ._native import FactorId, Graph, Noise, Session, Solution, Values, __version__, solve
+from ._native import FactorId, Graph, Noise, Smoother, Solution, Values, __version__, solve
 from ._native import read as _read
 from .batched import BatchFactor, batch
 from .chosen import Factor, Loss, Solver, Start, Variable
@@ -31,6 +31,9 @@ from .report import Report, Summary, experiment, run, written
 from .solvers import auto, dogleg, gauss_newton, gnc, levenberg_marquardt
 from .traced import Check, TracedFactor, check_factor, factor
 from .variables import *
+
+#: Alias of :class:`Smoother`, for code that was written for earlier versions.
+Session = Smoother
 
 __all__ = [
     "ArgumentError",
@@ -47,6 +50,7 @@ __all__ = [
     "Noise",
     "Report",
     "Session",
+    "Smoother",
     "Solution",
     "SolveError",
     "Solver",

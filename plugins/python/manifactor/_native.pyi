@@ -206,16 +206,16 @@ class Solution:
 
 @final
 class FactorId:
-    """The id of a factor in a session."""
+    """The id of a factor in a smoother."""
 
 @final
-class Session:
+class Smoother:
     """An incremental smoother: variables and factors are added and removed, and `update` recomputes the
     estimate."""
 
     def __new__(cls, **settings: Any) -> Self:
-        """Creates an empty session. `settings` are the fields of the table `online` of a document:
-        `relinearize_every`, `bend`, …"""
+        """Creates an empty smoother. `settings` are the fields of the table `online` of a document:
+        `relinearize_every`, `relinearization_threshold`, …"""
     def push(self, graph: Graph, values: Values) -> list[FactorId]:
         """Adds variables with their initial values, and factors between new or existing variables;
         variables that the graph fixes are fixed. Takes effect at the next update. Returns the ids of the
@@ -228,7 +228,7 @@ class Session:
         """Sets the time of the next factors and variables, for a window by time. Unit: seconds."""
     def update(self) -> dict[str, Any]:
         """Applies the changes, and updates the estimate. Returns a report: `redone`, `relinearized`,
-        `parked`, `undetermined` and so on. After an error, the session is unchanged."""
+        `parked`, `undetermined` and so on. After an error, the smoother is unchanged."""
     def __getitem__(self, key: str) -> Variable:
         """The estimate of a variable after the last update."""
     def __contains__(self, key: object) -> bool: ...
@@ -248,16 +248,16 @@ class Session:
         """Returns the active factors as a graph, with its fixed variables."""
     def finish(self, solver: Solver | None = None) -> tuple[Values, dict[str, Any]]:
         """Solves the whole graph as one batch from the estimate, and returns the values and the report of
-        the solver. The session does not change."""
+        the solver. The smoother does not change."""
     def save(self) -> str:
-        """Returns the session as a text. `Session.load` restores it bit for bit."""
+        """Returns the smoother as a text. `Smoother.load` restores it bit for bit."""
     def to_rerun(self, path: str | os.PathLike[str] | None = None, *, name: str = "session", every: int = 1) -> Live:
-        """Logs the session in the rerun viewer, or to a `.rrd` file, update by update. Call `push` and
-        `update` of the returned object instead of the session's. The map and its cost are drawn every
+        """Logs the smoother in the rerun viewer, or to a `.rrd` file, update by update. Call `push` and
+        `update` of the returned object instead of the smoother's. The map and its cost are drawn every
         `every` updates, in a time that grows with the size of the map. Needs `manifactor[rerun]`."""
     @staticmethod
-    def load(text: str) -> Session:
-        """Restores a saved session."""
+    def load(text: str) -> Smoother:
+        """Restores a saved smoother."""
 
 @final
 class BatchFunction:

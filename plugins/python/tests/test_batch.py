@@ -104,7 +104,7 @@ def test_two_functions_are_two_batches_and_constants_have_shapes() -> None:
 
 def test_a_session_takes_them() -> None:
     ranges, calls = numbers("by hand")
-    session = mf.Session(relinearize_every=1)
+    session = mf.Smoother(relinearize_every=1)
     graph, values = scene(ranges, 5)
     session.push(graph, values)
     session.update()

@@ -79,7 +79,7 @@ def test_a_problem_that_was_pickled_has_the_same_solution() -> None:
 
 
 def test_a_session_goes_through_pickle() -> None:
-    session = mf.Session()
+    session = mf.Smoother()
     session.push(*chain())
     session.update()
     again = pickle.loads(pickle.dumps(session))

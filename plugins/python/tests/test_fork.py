@@ -51,7 +51,7 @@ def covariance() -> float:
 
 
 def updated() -> float:
-    session = mf.Session()
+    session = mf.Smoother()
     session.push(GRAPH, VALUES)
     session.update()
     return session.cost()

@@ -63,10 +63,10 @@ def test_a_change_of_a_solution_is_an_error_and_of_a_copy_is_none() -> None:
 
 
 def test_values_of_a_session_do_not_change() -> None:
-    session = mf.Session()
+    session = mf.Smoother()
     session.push(*pair())
     session.update()
-    with pytest.raises(mf.GraphError, match="values of a session"):
+    with pytest.raises(mf.GraphError, match="values of a smoother"):
         session.values["b"] = ZERO
 
 

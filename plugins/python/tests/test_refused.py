@@ -89,7 +89,7 @@ def test_a_jacobian_of_another_shape_is_refused(shape: tuple[int, ...], solve: s
         if solve == "solve":
             mf.solve(graph, values)
         else:
-            session = mf.Session()
+            session = mf.Smoother()
             session.push(graph, values)
             session.update()
 

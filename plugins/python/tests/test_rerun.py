@@ -1,4 +1,4 @@
-"""Runs and sessions in the viewer: a written recording reads back."""
+"""Runs and smoothers in the viewer: a written recording reads back."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def frame(number: int) -> tuple[mf.Graph, mf.Values]:
 
 def test_a_session_is_logged_as_it_comes(tmp_path: Path) -> None:
     pytest.importorskip("rerun")
-    session = mf.Session()
+    session = mf.Smoother()
     with session.to_rerun(tmp_path / "drive.rrd") as shown:
         for number in range(4):
             shown.push(*frame(number))
@@ -76,7 +76,7 @@ def test_a_session_is_logged_as_it_comes(tmp_path: Path) -> None:
 
 def test_poses_that_have_left_stay_in_the_line_and_those_of_a_plane_lie_in_it(tmp_path: Path) -> None:
     pytest.importorskip("rerun")
-    with mf.Session(window={"poses": 2}).to_rerun(tmp_path / "plane.rrd", name="a plane", every=2) as shown:
+    with mf.Smoother(window={"poses": 2}).to_rerun(tmp_path / "plane.rrd", name="a plane", every=2) as shown:
         for number in range(5):
             graph, values = mf.Graph(), mf.Values({f"x{number}": mf.Se2(translation=[number, 1], angle=np.pi / 2)})
             if number == 0:
@@ -86,20 +86,20 @@ def test_poses_that_have_left_stay_in_the_line_and_those_of_a_plane_lie_in_it(tm
                 graph.add([f"x{number - 1}", f"x{number}"], step, noise=0.1)
             shown.push(graph, values)
             shown.update()
-        assert "x0" not in shown.session
+        assert "x0" not in shown.smoother
     rows = [row for path, row in logged(tmp_path / "plane.rrd") if path == r"/a\ plane/estimate/trajectory"]
     assert [row["iteration"] for row in rows] == [0, 2, 4]
     line = np.array(rows[-1]["LineStrips3D:strips"][0])
     np.testing.assert_allclose(line, [[i, 1, 0] for i in (0, 1, 2, 3, 4)], atol=1e-6)
     with pytest.raises(ValueError, match="every: expected a number of updates from 1, got 0"):
-        mf.Session().to_rerun(tmp_path / "none.rrd", every=0)
+        mf.Smoother().to_rerun(tmp_path / "none.rrd", every=0)
 
 
 def test_a_viewer_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)
     monkeypatch.delitem(sys.modules, "manifactor.rerun", raising=False)
     with pytest.raises(ModuleNotFoundError, match=r"pip install 'manifactor\[rerun\]'"):
-        mf.Session().to_rerun(tmp_path / "none.rrd")
+        mf.Smoother().to_rerun(tmp_path / "none.rrd")
 
 
 def logged(path: Path) -> list[tuple[str, dict[str, Any]]]:

@@ -119,7 +119,7 @@ def test_ctrl_c_ends_a_solve_and_other_threads_run_meanwhile() -> None:
 
 
 def test_a_session_follows() -> None:
-    session = mf.Session(relinearize_every=1)
+    session = mf.Smoother(relinearize_every=1)
     graph, values = mf.Graph(), mf.Values({"x0": mf.Point2(position=[0, 0])})
     graph.fix("x0")
     session.push(graph, values)
@@ -138,16 +138,16 @@ def test_a_session_follows() -> None:
     assert session.update()["parked"] == ["x9"]
     values, outcome = session.finish()
     assert outcome["termination"]["status"] == "converged" and len(values) == 10
-    again = mf.Session.load(session.save())
+    again = mf.Smoother.load(session.save())
     assert again["x8"] == session["x8"] and repr(again) == repr(session)
 
 
 def test_a_session_says_what_is_wrong() -> None:
-    with pytest.raises(mf.ArgumentError, match="unknown field `bent`.*did you mean `bend`"):
-        mf.Session(bent=0.1)
-    with pytest.raises(mf.ArgumentError, match="bend"):
-        mf.Session(bend=-1.0)
-    session = mf.Session()
+    with pytest.raises(mf.ArgumentError, match="unknown field `wildfire`.*did you mean `wildfire_threshold`"):
+        mf.Smoother(wildfire=0.1)
+    with pytest.raises(mf.ArgumentError, match="relinearization_threshold"):
+        mf.Smoother(relinearization_threshold=-1.0)
+    session = mf.Smoother()
     session.push(mf.Graph(), mf.Values({"x": mf.Point1(position=[0])}))
     with pytest.raises(mf.GraphError, match="there is a variable `x` already"):
         session.push(mf.Graph(), mf.Values({"x": mf.Point1(position=[0])}))

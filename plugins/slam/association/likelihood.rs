@@ -1,5 +1,4 @@
 //! Data association by the joint likelihood of box and class.
-mod division;
 mod fit;
 #[cfg(test)]
 mod rail;
@@ -33,8 +32,7 @@ use tracker::Tracker;
 /// detectors draw one box per class.
 ///
 /// An object that was lost starts again under a new id. Two objects are merged if one ellipsoid explains the
-/// boxes of both and they are not visible side by side. An object is split if only two ellipsoids explain its
-/// boxes. After a delay, all boxes of a frame are assigned a second time with the knowledge of that time, and
+/// boxes of both and they are not visible side by side. After a delay, all boxes of a frame are assigned a second time with the knowledge of that time, and
 /// boxes that show a different object move to it.
 ///
 /// The defaults were chosen on fr1/desk, fr1/desk2 and simulated desks: see the page on association in

@@ -86,7 +86,7 @@ pub struct RunSettings {
     pub solver: Arc<dyn Optimizer>,
     /// Incremental smoother that `manifactor online` updates with each frame.
     #[serde(default)]
-    pub online: manifactor_smoother::Settings,
+    pub online: manifactor_smoother::SmootherSettings,
     /// Comparison of the estimate with ground truth and with held-out boxes.
     #[serde(default)]
     pub evaluation: EvaluationSettings,
@@ -132,7 +132,7 @@ impl RunSettings {
         let errors = Errors::new();
         let settings = Section::new(node, &errors).and_then(|mut section| {
             let own = OwnGraph::read_section(&mut section);
-            let semantics = read_semantics(section.take("semantics"), folder, &own.values, &errors);
+            let semantics = read_semantics(section.optional_node("semantics"), folder, &own.values, &errors);
             let mut settings = Self { semantics, own, ..section.rest()? };
             if let Some(prior) = &mut settings.prior_map {
                 prior.read(folder, &settings.aliases, node, &errors)?;

@@ -17,7 +17,7 @@ use gravity::UpEstimate;
 use manifactor_association::{Associator, Corrections, FrameDetections, MapEstimate, ObjectIdChanges};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
-use manifactor_graph::manifold_name;
+use manifactor_graph::{TypeName, manifold_name};
 use manifactor_mapping::estimate::{Estimate, EstimateError};
 use manifactor_mapping::gravity::GravityError;
 use manifactor_mapping::mapping::measurements::{Measurements, ObjectMeasurements};
@@ -28,7 +28,7 @@ use manifactor_mapping::semantics::RuleError;
 use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::{Camera, DualQuadric};
 use manifactor_recording::sequence::{Frame, ObjectId, Observation, Sequence, SequenceHeader};
-use manifactor_smoother::{ChangeError, ManifoldType, Session, UpdateError};
+use manifactor_smoother::{ChangeError, Smoother, UpdateError};
 use manifactor_solve::Observer;
 use object::ObjectState;
 use std::any::TypeId;
@@ -47,7 +47,7 @@ pub use locate::Relocalization;
 pub struct Mapper {
     settings: Arc<RunSettings>,
     camera: Camera,
-    smoother: Session,
+    smoother: Smoother,
     up: UpEstimate,
     associator: Box<dyn Associator>,
     /// Current objects of detections that were assigned differently at first.
@@ -124,7 +124,7 @@ impl Mapper {
             // only poses leave the window
             let own = settings.own.values.iter().map(|(_, value)| value.typetag_name());
             let kept = own.chain([manifold_name(TypeId::of::<DualQuadric>())]);
-            window.keep.extend(kept.filter_map(|name| ManifoldType::try_from(name.to_owned()).ok()));
+            window.keep.extend(kept.filter_map(|name| TypeName::new(name).ok()));
         }
         let trusted = settings.prior_map.as_ref().filter(|prior| prior.start.is_some());
         let known = trusted.map(|prior| prior.inflated_map().objects).unwrap_or_default();
@@ -135,7 +135,7 @@ impl Mapper {
             .filter_map(|measured| Some((measured.id, ObjectState::of_prior_object(measured)?)));
         Self {
             camera: opening.camera,
-            smoother: Session::new(online),
+            smoother: Smoother::new(online),
             associator: settings.association.create_associator(opening.camera, &settings.aliases, &known),
             settings: Arc::new(settings),
             id_changes: ObjectIdChanges::default(),
@@ -193,7 +193,7 @@ impl Mapper {
     }
 
     /// Returns the smoother with the current graph and estimate.
-    pub fn smoother(&mut self) -> &mut Session {
+    pub fn smoother(&mut self) -> &mut Smoother {
         &mut self.smoother
     }
 

@@ -8,7 +8,7 @@ use manifactor_graph::loss::Loss;
 use manifactor_graph::{
     Factor, FactorEntry, Graph, Key, Lifted, Manifold, Noise, Residual, Scalar, Values, register_factor,
 };
-use manifactor_smoother::{Session, Settings};
+use manifactor_smoother::{Smoother, SmootherSettings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 use nalgebra::{U3, Vector2, Vector3};
 use schemars::JsonSchema;
@@ -77,7 +77,7 @@ struct LandmarkMeasurement {
 
 /// Results of a smoother, pose by pose.
 struct SmootherRun {
-    session: Session,
+    session: Smoother,
     /// Newest pose after its update, and the pose from odometry alone.
     newest: Vec<Vector2<f64>>,
     odometry: Vec<Vector2<f64>>,
@@ -94,7 +94,7 @@ fn cpu_seconds() -> f64 {
 
 /// Maps landmarks by their ids.
 fn drive(steps: &[RobotStep], steering: Option<&Noise>) -> SmootherRun {
-    let session = Session::new(Settings::default());
+    let session = Smoother::new(SmootherSettings::default());
     let mut driven = SmootherRun { session, newest: vec![], odometry: vec![], times: vec![], gaps: vec![] };
     let (mut pose, mut alone) = (Se2::identity(), Se2::identity());
     for (i, RobotStep { odometry, seen }) in steps.iter().enumerate() {
@@ -137,7 +137,10 @@ fn drive(steps: &[RobotStep], steering: Option<&Noise>) -> SmootherRun {
         session.push(&graph, &values).unwrap();
         let report = driven.session.update().unwrap();
         driven.times.push(1e3 * (cpu_seconds() - begin));
-        assert!(report.parked.is_empty() && report.undetermined.is_empty(), "{report:?}");
+        assert!(
+            report.undetermined_variables.is_empty() && report.undetermined_directions.is_empty(),
+            "{report:?}"
+        );
         pose = driven.session.get(here.as_str()).unwrap();
         driven.newest.push(pose.translation);
         driven.odometry.push(alone.translation);

@@ -112,7 +112,10 @@ impl LiveMap {
             self.path.correct(|frame| mapper.pose_of(frame));
         }
         self.notes.take(report, |id| mapper.id_changes().current_id(id));
-        let parked = report.updates.last().map(|update| (&update.parked, &update.undetermined));
+        let parked = report
+            .updates
+            .last()
+            .map(|update| (&update.undetermined_variables, &update.undetermined_directions));
         if let Some((parked, undetermined)) = parked {
             self.waiting = parked.len() + undetermined.len();
             let parked = parked.iter().map(ToString::to_string);

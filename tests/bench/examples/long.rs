@@ -11,7 +11,7 @@ use manifactor_formats::replay::Latencies;
 use manifactor_geometry::{Between, Se2, So2};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Graph, Key, Noise, Values};
-use manifactor_smoother::{Session, Settings, Span};
+use manifactor_smoother::{Smoother, SmootherSettings, Span};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -111,7 +111,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let is_windowed = window.is_some();
-    let mut session = Session::new(Settings { window, ..Settings::default() });
+    let mut session = Smoother::new(SmootherSettings { window, ..SmootherSettings::default() });
     let mut robot = Robot::new(seed, step);
     let sigmas = ODOMETRY.map(|sigma| sigma * step.sqrt());
     let (odometry, closure) = (Noise::sigmas(&sigmas)?, Noise::sigmas(&CLOSURE)?);
@@ -173,7 +173,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cost {cost:.3}, as one batch {best:.3}: {:.1e} above", (cost - best) / best);
     if !is_windowed {
         // memory that is due to the history, compared with the same graph ordered at once
-        let mut fresh = Session::new(Settings::default());
+        let mut fresh = Smoother::new(SmootherSettings::default());
         fresh.push(&session.graph().0, &session.estimates())?;
         let begin = cpu_seconds();
         fresh.update()?;

@@ -13,7 +13,7 @@ use manifactor_formats::pose_graph::{self, PoseGraphOptions};
 use manifactor_formats::replay::{GraphReplay, Latencies};
 use manifactor_geometry::{Between, Se2, Se3};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
-use manifactor_smoother::{FactorId, Outliers, Session, Settings};
+use manifactor_smoother::{FactorId, Outliers, Smoother, SmootherSettings};
 use manifactor_solve::{Gnc, LevenbergMarquardt, Problem, Silent, solve};
 use nalgebra::{Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
@@ -109,8 +109,8 @@ fn judge(rejected: &HashSet<usize>, misled: &Misled) -> (f64, f64, f64) {
 }
 
 fn online(truth: &Graph, misled: &Misled) -> Line {
-    let settings = Settings { outliers: Some(Outliers::default()), ..Settings::default() };
-    let mut session = Session::new(settings);
+    let settings = SmootherSettings { outliers: Some(Outliers::default()), ..SmootherSettings::default() };
+    let mut session = Smoother::new(settings);
     let mut places: std::collections::HashMap<String, Vec<usize>> = std::collections::HashMap::new();
     let text = |entry: &FactorEntry| serde_json::to_string(entry).unwrap();
     for (i, entry) in misled.graph.factors().iter().enumerate() {

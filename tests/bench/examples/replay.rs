@@ -7,7 +7,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::pose_graph::{self, InformationRepair, PoseGraph, PoseGraphOptions};
 use manifactor_formats::replay::{GraphReplay, Latencies};
-use manifactor_smoother::{Session, Settings};
+use manifactor_smoother::{Smoother, SmootherSettings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 
 /// CPU time of this thread, independent of the load of the machine. Unit: seconds.
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     for path in files {
         let PoseGraph { graph, values, .. } = pose_graph::read(&path, &options)?;
-        let mut session = Session::new(Settings::default());
+        let mut session = Smoother::new(SmootherSettings::default());
         let (mut times, mut differences) = (vec![], vec![]);
         let (mut damped, mut batches) = (0, 0);
         let mut replay = GraphReplay::of(&graph, &values);

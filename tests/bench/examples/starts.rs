@@ -5,12 +5,12 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::pose_graph::{self, PoseGraphOptions};
 use manifactor_geometry::{Chordal, SpanningTree, Tree, certify};
-use manifactor_solve::{GaussNewton, Given, LevenbergMarquardt, Optimizer, Silent, Start, solve};
+use manifactor_solve::{GaussNewton, GivenStart, LevenbergMarquardt, Optimizer, Silent, Start, solve};
 use std::time::Instant;
 
 fn main() {
     let starts: [(&str, Box<dyn Start>); 4] = [
-        ("given", Box::new(Given {})),
+        ("given", Box::new(GivenStart {})),
         ("chain", Box::new(SpanningTree { tree: Tree::Chain })),
         ("shallow", Box::new(SpanningTree { tree: Tree::Shallow })),
         ("chordal", Box::new(Chordal {})),

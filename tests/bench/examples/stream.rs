@@ -41,7 +41,7 @@ impl StreamWatcher for Gaps {
                 "born {} revised {} redone {:?} damped {:?} passes {:?} batch {:?}",
                 report.initialized.len(),
                 report.revised.len(),
-                report.updates.iter().map(|u| u.redone).collect::<Vec<_>>(),
+                report.updates.iter().map(|u| u.refactorized).collect::<Vec<_>>(),
                 report.updates.iter().map(|u| u.damped).collect::<Vec<_>>(),
                 report.updates.iter().map(|u| u.passes).collect::<Vec<_>>(),
                 report.updates.iter().map(|u| u.solved_batch).collect::<Vec<_>>(),

@@ -7,7 +7,7 @@
 use manifactor_formats::pose_graph::{self, PoseGraph, PoseGraphOptions};
 use manifactor_formats::replay::{GraphReplay, Latencies};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
-use manifactor_smoother::{Session, Settings, Span, Window};
+use manifactor_smoother::{Smoother, SmootherSettings, Span, Window};
 use std::num::NonZeroUsize;
 
 /// CPU time of this thread, independent of the load of the machine. Unit: seconds.
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let PoseGraph { graph, values, .. } = pose_graph::read(&path, &PoseGraphOptions::default())?;
     let window = Some(Window::from(Span::Poses(NonZeroUsize::new(poses).unwrap())));
-    let mut session = Session::new(Settings { window, ..Settings::default() });
+    let mut session = Smoother::new(SmootherSettings { window, ..SmootherSettings::default() });
     let name = |pass: usize, key: &Key| Key::from(format!("{pass}:{key}"));
     let mut last: Option<Key> = None;
     println!("| pass | left out | p50 | p99 | max | MB of fronts | MB of the process | bytes saved |");

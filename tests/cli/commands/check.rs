@@ -67,7 +67,9 @@ fn what_is_not_finite_or_not_defined_at_the_start_is_told() {
 fn other_units_and_another_order_of_quaternions_are_told() {
     let quadric = "variables = [{ key = \"q0\", value = { type = \"dual_quadric\", translation = [0.0, 0.0, 900.0], \
                    rotation = [0.0, 0.0, 0.0, 1.0], semi_axes = [100.0, 100.0, 150.0] } }]\nfactors = []\n";
-    check("mm.toml", quadric).ended(0).complains("q0; semi-axes are metres here; are these millimetres?");
+    check("mm.toml", quadric)
+        .ended(0)
+        .complains("q0; the unit of semi-axes is metres; are these millimetres?");
     let edge = |i: u32, x: f64, xyzw: &str| {
         format!("EDGE_SE3:QUAT {i} {} {x} 0 0 {xyzw} 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n", i + 1)
     };

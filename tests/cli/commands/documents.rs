@@ -53,6 +53,33 @@ fn data_that_are_not_there_are_looked_for_by_name() {
 }
 
 #[test]
+fn a_table_in_place_of_an_array_of_tables_is_shown_with_its_brackets() {
+    let single = BROKEN.replace("[[factors]]", "[factors]");
+    let folder = folder(&[("graph.toml", &single)]);
+    manifactor(&format!("check {}", path(&folder, "graph.toml"))).ended(2).complains("write `[[factors]]`");
+}
+
+#[test]
+fn an_axis_with_unknown_fields_is_shown_with_both_forms() {
+    let sweep = "base = 'run.toml'\n[[axes]]\nkey = 'source.seed'\nvalues = [1, 2]\n";
+    let folder = folder(&[("sweep.toml", sweep), ("run.toml", "source = { type = 'simulated' }\n")]);
+    let ran = manifactor(&format!("check {}", path(&folder, "sweep.toml"))).ended(2);
+    ran.complains("an axis has `columns` and `rows`, or `name` and `options`");
+}
+
+#[test]
+fn only_the_first_searched_folders_are_listed() {
+    let folder = folder(&[]);
+    for data in ["a", "b", "c", "d", "e"] {
+        std::fs::create_dir(path(&folder, data)).unwrap();
+    }
+    let data = folder.path().display();
+    let ran = manifactor(&format!("run examples/tum/fr1_desk.toml --data {data}")).ended(3);
+    ran.complains("and 4 more");
+    ran.complains("check the name, and the folder given by --data or MANIFACTOR_DATA");
+}
+
+#[test]
 fn an_override_that_fits_nothing_is_shown() {
     manifactor("check examples/desk/desk.toml --set source.scene.objets=3").ended(2).complains("objects");
 }

@@ -43,7 +43,7 @@ fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
     let folder = folder(&[("base.toml", BASE), ("sweep.toml", SWEEP)]);
     let (whole, killed) = (path(&folder, "whole"), path(&folder, "killed"));
     let ran = sweep(&folder, &whole, 2).ended(0);
-    assert!(ran.stdout.contains("less the baseline") && ran.stdout.contains("position"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("minus the baseline") && ran.stdout.contains("position"), "{}", ran.stdout);
 
     // or it ends earlier, on a fast machine
     ends_before(&path(&folder, "sweep.toml"), Path::new(&killed), &Moment::Trials(3));
@@ -56,7 +56,7 @@ fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
 
     let ran = sweep(&folder, &killed, 1).ended(0);
     assert!(
-        ran.stderr.contains(&format!("{done} of 12 trials done, {done} of them before")),
+        ran.stderr.contains(&format!("{done} of 12 trials done, {done} of them by earlier commands")),
         "{}",
         ran.stderr
     );
@@ -64,7 +64,7 @@ fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
     assert!(tables(&killed) == tables(&whole));
     // the third call has nothing to do
     let ran = sweep(&folder, &killed, 2).ended(0);
-    assert!(ran.stderr.contains("12 of 12 trials done, 12 of them before"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("12 of 12 trials done, 12 of them by earlier commands"), "{}", ran.stderr);
     assert_eq!(trials(Path::new(&killed)), 12);
 }
 
@@ -131,14 +131,18 @@ fn parts_of_a_sweep_end_with_the_same_tables_when_they_are_put_together() {
     // one part is left for the end, and one was torn
     for text in ["1/3", "3/3"] {
         let ran = part(text).ended(0);
-        assert!(ran.stderr.contains("This part has 4 trials") && ran.stdout.is_empty(), "{}", ran.stderr);
+        assert!(
+            ran.stderr.contains("The 4 trials of this part are in") && ran.stdout.is_empty(),
+            "{}",
+            ran.stderr
+        );
     }
     assert!(!Path::new(&parts).exists());
     let log = format!("{parts}.shards/3-of-3/trials.jsonl");
     let text = std::fs::read_to_string(&log).unwrap();
     std::fs::write(&log, &text[..text.len() - 20]).unwrap();
     let ran = sweep(&folder, &parts, 1).ended(0);
-    assert!(ran.stderr.contains("7 of 12 trials done, 7 of them before"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("7 of 12 trials done, 7 of them by earlier commands"), "{}", ran.stderr);
     assert_eq!(tables(&parts), tables(&whole));
     let ran = part("4/3").ended(2);
     assert!(

@@ -63,7 +63,7 @@ fn what_is_not_finite_is_broken_and_the_point_reproduces_it() {
 #[test]
 fn parameters_are_checked_like_those_of_a_document() {
     let check = |json| run(["check-factor", "rests", "--parameters", json], &[]);
-    check("{}").ended(2).complains("no factor is called `rests`");
+    check("{}").ended(2).complains("unknown factor `rests`");
     let check = |json| run(["check-factor", "vertical_orientation", "--parameters", json], &[]);
     check(r#"{ "up": [0, 1, 0] }"#).ended(0);
     check(r#"{ "upp": [0, 1, 0] }"#).ended(2).complains("did you mean `up`?");

@@ -19,7 +19,7 @@ fn a_second_run_begins_with_the_map_of_the_first() {
     // both runs use the names of the source, so the poses are unambiguous
     let again = format!("{desk} --out {second} --set prior_map.file={map}");
     let ran = manifactor(&format!("run {again} --set source.seed=9")).ended(0);
-    assert!(ran.stdout.contains("seen again, none gone"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("detected again, none removed"), "{}", ran.stdout);
     let prior = &report(&second)["prior_map"];
     assert_eq!(prior["objects"], objects);
     assert_eq!(prior["is_located"], true);
@@ -33,7 +33,7 @@ fn a_second_run_begins_with_the_map_of_the_first() {
     let online =
         format!("online {live} --set association.type=given --set prior_map.file={map} --every 1000");
     let ran = fed(&format!("{online} --out {third} --json"), &frames);
-    ran.complains("the place in the prior map is found, by");
+    ran.complains("relocalized in the prior map by");
     let lines: Vec<Value> =
         ran.ended(0).stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(lines.len(), 2, "the frame that shows the place, and the report");
@@ -45,7 +45,7 @@ fn a_second_run_begins_with_the_map_of_the_first() {
     );
     let ran = fed(&format!("{online} --out {}", path(&folder, "fourth")), &frames).ended(0);
     let frame = lines[0]["report"]["frame"].as_u64().unwrap() + 1;
-    ran.complains(&format!("after {frame} frames the place in the prior map is found, by"));
+    ran.complains(&format!("after {frame} frames, relocalized in the prior map by"));
     ran.complains(&format!(" {frame} frames: "));
 }
 

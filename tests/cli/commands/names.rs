@@ -1,4 +1,4 @@
-use crate::manifactor;
+use crate::{folder, manifactor, path};
 
 #[test]
 fn all_kinds_are_listed_and_one_on_request() {
@@ -10,6 +10,62 @@ fn all_kinds_are_listed_and_one_on_request() {
     let losses = losses.as_array().unwrap();
     assert!(losses.len() >= 9 && losses.iter().all(|l| l["kind"] == "loss"), "{losses:?}");
     manifactor("list facters").ended(2).complains("did you mean `factor`?");
+}
+
+#[test]
+fn a_pipe_gets_one_name_per_line() {
+    let lines = manifactor("list solvers").ended(0).stdout;
+    let json = manifactor("list solvers --json").ended(0).json();
+    let names: Vec<&str> = json.as_array().unwrap().iter().map(|s| s["name"].as_str().unwrap()).collect();
+    assert_eq!(lines.lines().collect::<Vec<_>>(), names);
+}
+
+#[test]
+fn documents_and_their_tables_are_explained() {
+    for (name, parts) in [
+        ("experiment", ["a kind of document", "axes[].columns", "manifactor experiment", "Example:"]),
+        ("run", ["a kind of document", "detections.loss", "manifactor run", "Example:"]),
+        ("graph", ["a kind of document", "factors[].keys", "manifactor solve", "Example:"]),
+        ("rules", ["a kind of document", "semantics[].classes", "semantics = \"rules.toml\"", "Example:"]),
+        ("axes", ["a field of the document experiment", "axes[].rows", "axes[].options", "list of table"]),
+        (
+            "solver",
+            [
+                "document graph\n\nThe solver",
+                "document run\n",
+                "manifactor list solver",
+                "levenberg_marquardt",
+            ],
+        ),
+        ("summary.baseline", ["a field of the document experiment", "compared", "Type:", "Default"]),
+    ] {
+        let text = manifactor(&format!("explain {name}")).ended(0).stdout;
+        for part in parts {
+            assert!(text.contains(part), "{name}: {part} is missing:\n{text}");
+        }
+    }
+    let json = manifactor("explain axes --json").ended(0).json();
+    assert_eq!((&json[0]["kind"], &json[0]["documents"][0]), (&"field".into(), &"experiment".into()));
+    manifactor("explain axs").ended(2).complains("did you mean `axes`?");
+    manifactor("explain solve").ended(2).complains("`manifactor help solve` explains the command");
+    manifactor("explain factor").ended(2).complains("`manifactor list factor` prints");
+    let text = manifactor("explain given").ended(0).stdout;
+    assert!(text.contains("given: an association"), "{text}");
+}
+
+#[test]
+fn the_examples_of_documents_are_documents() {
+    let folder = folder(&[]);
+    for kind in ["graph", "run", "rules", "experiment"] {
+        let json = manifactor(&format!("explain {kind} --json")).ended(0).json();
+        let example =
+            json.as_array().unwrap().iter().find(|one| one["kind"] == "document").unwrap()["example"].clone();
+        std::fs::write(path(&folder, &format!("{kind}.toml")), example.as_str().unwrap()).unwrap();
+    }
+    for kind in ["graph", "run", "experiment"] {
+        manifactor(&format!("check {}", path(&folder, &format!("{kind}.toml")))).ended(0);
+    }
+    manifactor(&format!("check {} --set semantics=rules.toml", path(&folder, "run.toml"))).ended(0);
 }
 
 #[test]

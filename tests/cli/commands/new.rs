@@ -42,15 +42,17 @@ fn a_new_plugin_compiles_and_passes_outside_of_the_workspace() {
 fn a_plugin_is_not_written_over_another_nor_under_a_bad_name() {
     let folder = folder(&[("there", "")]);
     let path = |name: &str| folder.path().join(name).display().to_string();
-    run(["new", "plugin", &path("there")], &[]).ended(2).complains("is there already");
+    run(["new", "plugin", &path("there")], &[]).ended(2).complains("exists already");
     run(["new", "plugin", &path("On-Shelf")], &[]).ended(2).complains("such as `on_the_shelf`");
     let nowhere = folder.path().display().to_string();
-    run(["new", "plugin", &path("new_one"), "--manifactor", &nowhere], &[]).ended(2).complains("no checkout");
+    run(["new", "plugin", &path("new_one"), "--manifactor", &nowhere], &[])
+        .ended(2)
+        .complains("is not a checkout");
     assert!(!folder.path().join("new_one").exists());
     manifactor("new").ended(2).complains("plugin");
     let taken = path("vertical-orientation");
     run(["new", "plugin", &taken], &[])
         .ended(2)
-        .complains("there is a factor `vertical_orientation` already");
+        .complains("the factor `vertical_orientation` exists already");
     assert!(!Path::new(&taken).exists());
 }

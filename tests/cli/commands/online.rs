@@ -23,7 +23,7 @@ fn a_run_is_mapped_frame_by_frame() {
     let folder = folder(&[("desk.toml", DESK)]);
     let (desk, out) = (path(&folder, "desk.toml"), path(&folder, "out"));
     let ran = manifactor(&format!("online {desk} --out {out} --every 20")).ended(0);
-    assert!(ran.stdout.contains("60 frames as they came, p50"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("60 frames processed as they arrived, latency p50"), "{}", ran.stdout);
     ran.complains("20 frames: ");
     let poses = |name: &str| std::fs::read_to_string(format!("{out}/estimate/{name}")).unwrap();
     let (live, end) = (poses("live.txt"), poses("trajectory.txt"));
@@ -95,7 +95,7 @@ fn frames_that_come_as_lines_are_mapped_without_names() {
     let ran = fed(&format!("online {live} --out {out}"), &broken).ended(0);
     ran.complains("standard input, line 3: EOF while parsing");
     ran.complains("does not come after the one before");
-    assert!(ran.stdout.contains("boxes put to objects by likelihood"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("data association by likelihood"), "{}", ran.stdout);
     assert!(!ran.stdout.contains("count in full"), "{}", ran.stdout);
     let plain = LIVE.replace("detections = { loss = { type = \"cauchy\", scale = 2.8 } }", "");
     std::fs::write(path(&folder, "plain.toml"), plain).unwrap();
@@ -199,7 +199,7 @@ fn a_stream_that_is_killed_at_any_moment_goes_on_with_the_same_map() {
         assert!(read(&whole) == read(&out), "{file}");
     }
     // different settings make a different map
-    let ran = fed(&format!("{command} --set online.bend=0.2"), &frames);
+    let ran = fed(&format!("{command} --set online.relinearization_threshold=0.2"), &frames);
     ran.ended(2).complains("is the journal of other settings");
 }
 

@@ -12,17 +12,13 @@ fn a_run_leaves_its_files() {
     let ran =
         manifactor(&format!("run examples/desk/desk.toml --out {out} {SMALL} --set report.covariances=true"));
     assert!(ran.code == 0 || ran.code == 1, "{}", ran.stderr);
-    for text in [
-        "ATE",
-        "position",
-        "shape",
-        "quality",
-        "QuadricSLAM",
-        "before the solve",
-        "condition",
-        "over 40 of 40 poses",
-    ] {
+    for text in
+        ["ATE", "position", "shape", "quality", "QuadricSLAM", "before the solve", "over 40 of 40 poses"]
+    {
         assert!(ran.stdout.contains(text), "{text} is missing:\n{}", ran.stdout);
+    }
+    for text in ["condition number", "largest cost", "σ"] {
+        assert!(!ran.stdout.contains(text), "{text} is for -v:\n{}", ran.stdout);
     }
     let out = Path::new(&out);
     assert!(out.join("report.json").is_file());
@@ -41,6 +37,16 @@ fn a_run_leaves_its_files() {
     for view in ["map_top.svg", "map_side.svg"] {
         let picture = std::fs::read_to_string(out.join("quadricslam").join(view)).unwrap();
         assert!(picture.contains("</svg>") && picture.contains("odometry"), "{view}");
+    }
+}
+
+#[test]
+fn the_condition_the_largest_cost_and_the_noise_are_printed_on_request() {
+    let folder = folder(&[]);
+    let out = path(&folder, "desk");
+    let ran = manifactor(&format!("run examples/desk/desk.toml --out {out} {SMALL} -v"));
+    for text in ["condition number", "largest cost", "σ"] {
+        assert!(ran.stdout.contains(text), "{text} is missing:\n{}", ran.stdout);
     }
 }
 

@@ -89,7 +89,7 @@ fn a_sweep_that_cannot_write_goes_on_where_there_is_room() {
     refused(&ran, &["trials.jsonl", "File too large"]);
     assert_eq!(names(Path::new(&out)), [".manifactor", "trials.jsonl"]);
     let ran = manifactor(&format!("experiment {config} --out {out}")).ended(0);
-    assert!(!ran.stderr.contains(" 0 of them before"), "{}", ran.stderr);
+    assert!(!ran.stderr.contains(" 0 of them by earlier commands"), "{}", ran.stderr);
     let whole = path(&folder, "whole");
     manifactor(&format!("experiment {config} --out {whole}")).ended(0);
     assert!(tables(&out) == tables(&whole));
@@ -220,7 +220,7 @@ fn a_limit_of_memory_without_room_for_the_threads_is_refused() {
         let ended = after("ulimit -v 300000", &format!("{command} --out {out} --threads 2"));
         let said = String::from_utf8_lossy(&ended.stderr);
         assert_eq!(ended.status.code(), Some(2), "{command}: {said}");
-        for words in ["the limit of memory is", "--threads"] {
+        for words in ["the memory limit is", "--threads"] {
             assert!(said.contains(words), "{command}: {said}");
         }
     }

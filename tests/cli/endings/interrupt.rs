@@ -89,7 +89,7 @@ fn a_signal_ends_a_solve_with_the_best_values_written() {
         let out = path(&folder, &format!("solved{signal}.json"));
         let solve = AtWork::begin(&format!("solve {} --out {out}", path(&folder, "graph.toml")));
         let ran = solve.until("iteration", 20).ended_by(signal).ended(130);
-        assert!(ran.stderr.contains("interrupted: ending with what there is"), "{}", ran.stderr);
+        assert!(ran.stderr.contains("interrupted: writing the results so far"), "{}", ran.stderr);
         assert!(ran.stdout.contains("interrupted"), "{}", ran.stdout);
         // complete, and no worse than the initial value
         let x = read(&out)["variables"][0]["value"]["position"][0].as_f64().unwrap();

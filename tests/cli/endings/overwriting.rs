@@ -44,7 +44,7 @@ fn a_file_is_not_written_over_unless_forced() {
     for out in [&graph, &path(&folder, "./a.g2o")] {
         manifactor(&format!("solve {graph} --out {out}")).ended(2).complains("is the graph itself");
     }
-    manifactor(&format!("solve {graph} --out {other}")).ended(2).complains("is there already");
+    manifactor(&format!("solve {graph} --out {other}")).ended(2).complains("exists already");
     assert_eq!((text(&graph), text(&other)), (GRAPH.to_owned(), "precious".to_owned()));
     manifactor(&format!("solve {graph} --out {other} --force")).ended(0);
     assert!(text(&other).contains("between_se2"));
@@ -64,7 +64,7 @@ fn a_file_that_is_written_over_keeps_its_permissions_and_a_link_its_target() {
     symlink(at("nothing"), at("d.json")).unwrap();
     for out in ["c.json", "d.json"] {
         let solve = format!("solve {} --out {}", path(&folder, "a.g2o"), path(&folder, out));
-        manifactor(&solve).ended(2).complains("is there already");
+        manifactor(&solve).ended(2).complains("exists already");
     }
     for out in ["b.json", "c.json", "d.json"] {
         let solve = format!("solve {} --out {} --force", path(&folder, "a.g2o"), path(&folder, out));

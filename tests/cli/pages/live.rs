@@ -148,7 +148,10 @@ fn a_page_shows_the_map_as_it_grows() {
     browser.until("document.documentElement.dataset.phase === 'ended'");
     let (code, said) = stream.ended();
     assert_eq!(code, 0, "{said}");
-    assert_eq!(browser.value("document.getElementById('words').textContent"), "all is written");
+    assert_eq!(
+        browser.value("document.getElementById('words').textContent"),
+        "finished; all files are written"
+    );
     assert_eq!(browser.value("document.documentElement.dataset.frames"), "60");
     // the page shows the same results as the written files
     let metrics = std::fs::read_to_string(format!("{out}/estimate/metrics.json")).unwrap();
@@ -243,5 +246,5 @@ fn an_address_that_cannot_be_is_told_before_any_frame() {
     let ran = manifactor(&format!("online {desk} --out {out} --view --json --every 60")).ended(0);
     let first: Value = serde_json::from_str(ran.stdout.lines().next().unwrap()).unwrap();
     assert!(first["view"].as_str().unwrap().starts_with("http://127.0.0.1:"), "{first}");
-    ran.complains("the map as it grows: http://127.0.0.1:");
+    ran.complains("live map: http://127.0.0.1:");
 }

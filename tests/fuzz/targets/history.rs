@@ -4,7 +4,7 @@ use manifactor::geometry::{BearingRange2, Between, Point2, Prior, Range, Se2, So
 use manifactor::graph::checked::Positive;
 use manifactor::graph::{Fixed, Variable};
 use manifactor::prelude::*;
-use manifactor::smoother::{FactorId, Session, Settings};
+use manifactor::smoother::{FactorId, Smoother, SmootherSettings};
 
 /// Longer histories are truncated, so that each input is fast.
 const LONGEST: usize = 120;
@@ -21,12 +21,12 @@ pub fn history(data: &[u8]) {
     let mut lines = text.lines().take(LONGEST).peekable();
     let written = lines.next_if(|line| line.starts_with("settings"));
     let settings = written.and_then(|line| serde_json::from_str(line.strip_prefix("settings")?).ok());
-    let mut settings: Settings = settings.unwrap_or_default();
+    let mut settings: SmootherSettings = settings.unwrap_or_default();
     settings.passes = settings.passes.min(PASSES);
-    let session = Session::new(settings);
-    let mut own = Smoother::new(session);
+    let session = Smoother::new(settings);
+    let mut own = TrackedSmoother::new(session);
     // a session that has never processed the failed updates
-    let mut twin: Option<Smoother> = None;
+    let mut twin: Option<TrackedSmoother> = None;
     for line in lines.map(Line::new) {
         match line.name() {
             "update" => {
@@ -80,8 +80,8 @@ impl<'a> Line<'a> {
 }
 
 /// A session, with the keys and ids of its variables and factors.
-struct Smoother {
-    session: Session,
+struct TrackedSmoother {
+    session: Smoother,
     keys: Vec<Key>,
     ids: Vec<FactorId>,
     /// Text of the session after the last successful update.
@@ -91,15 +91,15 @@ struct Smoother {
     is_idle: bool,
 }
 
-impl Smoother {
-    fn new(session: Session) -> Self {
+impl TrackedSmoother {
+    fn new(session: Smoother) -> Self {
         let saved = session.save().unwrap_or_else(|e| panic!("{e}"));
         Self { session, keys: vec![], ids: vec![], saved, saved_ids: vec![], is_idle: true }
     }
 
     /// Loads the saved session.
     fn restarted(&self) -> Self {
-        let session = Session::load(&self.saved).unwrap_or_else(|e| panic!("{e}"));
+        let session = Smoother::load(&self.saved).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(session.save().unwrap_or_else(|e| panic!("{e}")), self.saved);
         let (keys, saved) = (self.keys.clone(), self.saved.clone());
         let (ids, saved_ids) = (self.saved_ids.clone(), self.saved_ids.clone());
@@ -195,7 +195,7 @@ impl Smoother {
         let updated = self.session.update().is_ok();
         let saved = self.session.save().unwrap_or_else(|e| panic!("{e}"));
         if updated {
-            let again = Session::load(&saved).unwrap_or_else(|e| panic!("{e}"));
+            let again = Smoother::load(&saved).unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(again.save().unwrap_or_else(|e| panic!("{e}")), saved);
             assert_eq!(bits(&again), self.bits());
             (self.saved, self.saved_ids) = (saved, self.ids.clone());
@@ -213,7 +213,7 @@ impl Smoother {
 
     /// Returns the estimates after the last successful update.
     fn last_bits(&self) -> Vec<(Key, Vec<u64>)> {
-        bits(&Session::load(&self.saved).unwrap_or_else(|e| panic!("{e}")))
+        bits(&Smoother::load(&self.saved).unwrap_or_else(|e| panic!("{e}")))
     }
 
     /// Checks that all estimates and covariances are finite.
@@ -254,7 +254,7 @@ fn pose([x, y, angle]: [f64; 3]) -> Se2 {
 }
 
 /// Returns all estimates as bits.
-fn bits(session: &Session) -> Vec<(Key, Vec<u64>)> {
+fn bits(session: &Smoother) -> Vec<(Key, Vec<u64>)> {
     let numbers = |value: &dyn Variable| -> Vec<f64> {
         let value = value.erased().as_any();
         if let Some(point) = value.downcast_ref::<Point2>() {

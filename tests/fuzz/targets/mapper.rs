@@ -14,7 +14,7 @@ use manifactor::slam::sequence::{
     Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, SequenceHeader,
 };
 use manifactor::slam::settings::RunSettings;
-use manifactor::smoother::Session;
+use manifactor::smoother::Smoother;
 use std::sync::{Arc, LazyLock};
 
 /// Longer streams are truncated, so that each input is fast.
@@ -62,7 +62,7 @@ pub fn mapper(data: &[u8]) {
     clean.finish_association();
     assert_eq!(estimates(mapper.smoother()), estimates(clean.smoother()), "a refused frame left a trace");
     let saved = mapper.smoother().save().unwrap_or_else(|e| panic!("{e}"));
-    let loaded = Session::load(&saved).unwrap_or_else(|e| panic!("{e}"));
+    let loaded = Smoother::load(&saved).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(loaded.save().unwrap_or_else(|e| panic!("{e}")), saved);
     assert_eq!(estimates(&loaded), estimates(mapper.smoother()));
     let Ok(estimate) = mapper.finish(Arc::new(sequence), &mut third()) else { return };
@@ -83,7 +83,7 @@ fn settings(text: &str) -> RunSettings {
     run.variants[0].settings.clone()
 }
 
-fn estimates(session: &Session) -> Vec<(String, String)> {
+fn estimates(session: &Smoother) -> Vec<(String, String)> {
     let text = |value| serde_json::to_string(value).unwrap_or_else(|e| panic!("{e}"));
     session.estimates().iter().map(|(key, value)| (key.to_string(), text(value))).collect()
 }

@@ -4,7 +4,7 @@ use manifactor::formats::pose_graph::{self, PoseGraphOptions};
 use manifactor::formats::replay::GraphReplay;
 use manifactor::graph::GraphError;
 use manifactor::prelude::*;
-use manifactor::smoother::{ChangeError, Session, Settings};
+use manifactor::smoother::{ChangeError, Smoother, SmootherSettings};
 use std::collections::HashSet;
 
 /// Replays g2o and TORO files pose by pose. Each factor and each variable occurs once, and all estimates
@@ -19,7 +19,7 @@ pub fn replay(data: &[u8]) {
     if values.len() > SOLVED || graph.factors().len() > SOLVED {
         return;
     }
-    let mut session = Session::new(Settings::default());
+    let mut session = Smoother::new(SmootherSettings::default());
     let mut steps = GraphReplay::of(&graph, &values);
     let (mut factors, mut keys, has_poses) = (0, HashSet::new(), !steps.is_empty());
     loop {

@@ -1,13 +1,13 @@
 //! Saved sessions, with a checksum that fits the damaged document.
 use super::is_finite;
-use manifactor::smoother::Session;
+use manifactor::smoother::Smoother;
 
 /// Loads saved sessions, unchanged and with a valid checksum. A loaded session is finite, and continues bit
 /// for bit after a second restart.
 pub fn session(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
     for text in [text.to_string(), resealed(&text)] {
-        let Ok(mut session) = Session::load(&text) else { continue };
+        let Ok(mut session) = Smoother::load(&text) else { continue };
         is_finite(&session.estimates());
         let saved = save(&session);
         let mut again = load(&saved);
@@ -20,11 +20,11 @@ pub fn session(data: &[u8]) {
     }
 }
 
-fn load(text: &str) -> Session {
-    Session::load(text).unwrap_or_else(|e| panic!("{e}"))
+fn load(text: &str) -> Smoother {
+    Smoother::load(text).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn save(session: &Session) -> String {
+fn save(session: &Smoother) -> String {
     session.save().unwrap_or_else(|e| panic!("{e}"))
 }
 

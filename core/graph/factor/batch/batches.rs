@@ -22,7 +22,7 @@ impl Batches {
         loss: Option<&dyn Loss>,
     ) -> usize {
         let of_type = self.of_type.entry(residual.type_id()).or_default();
-        let fits = |batch: &dyn Batch| batch.fits(noise, loss) && batch.takes(residual.as_any());
+        let fits = |batch: &dyn Batch| batch.fits(noise, loss) && batch.accepts_parameters(residual.as_any());
         let found = of_type.iter().copied().find(|b| fits(&*self.all[*b as usize]));
         let place = found.unwrap_or_else(|| {
             self.all.push(residual.new_batch(noise, loss));

@@ -9,21 +9,21 @@ use std::ops::Range;
 fn swap_list(ends: &mut Vec<u32>, index: usize, mut replace: impl FnMut(Range<usize>, Range<usize>)) {
     let begin = |i: usize| if i == 0 { 0 } else { ends[i - 1] as usize };
     let last = ends.len() - 1;
-    let (gone, moved) = (begin(index)..ends[index] as usize, begin(last)..ends[last] as usize);
-    let (before, after) = (gone.len(), moved.len());
-    replace(gone, moved);
+    let (removed, moved) = (begin(index)..ends[index] as usize, begin(last)..ends[last] as usize);
+    let (before, after) = (removed.len(), moved.len());
+    replace(removed, moved);
     ends.pop();
     if before != after && index < last {
         ends[index..].iter_mut().for_each(|end| *end = (*end as usize + after - before) as u32);
     }
 }
 
-/// Replaces `list[gone]` by `list[moved]`, the end of the list, which is removed.
-fn swap<T: Copy>(list: &mut Vec<T>, gone: Range<usize>, moved: Range<usize>) {
+/// Replaces `list[removed]` by `list[moved]`, the end of the list, which is removed.
+fn swap<T: Copy>(list: &mut Vec<T>, removed: Range<usize>, moved: Range<usize>) {
     let last: Vec<T> = list.drain(moved).collect();
-    let end = gone.end.min(list.len());
-    if gone.start < end {
-        list.splice(gone.start..end, last);
+    let end = removed.end.min(list.len());
+    if removed.start < end {
+        list.splice(removed.start..end, last);
     }
 }
 
@@ -34,16 +34,16 @@ impl<F: Kernel> BatchOf<F> {
         if index >= self.factors.len() {
             return None;
         }
-        swap_list(&mut self.ends, index, |gone, moved| {
-            swap(&mut self.index, gone.clone(), moved.clone());
-            swap(&mut self.starts, gone.clone(), moved.clone());
-            swap(&mut self.free, gone.clone(), moved.clone());
-            if !self.held.is_empty() {
-                swap(&mut self.held, gone, moved);
+        swap_list(&mut self.ends, index, |removed, moved| {
+            swap(&mut self.index, removed.clone(), moved.clone());
+            swap(&mut self.starts, removed.clone(), moved.clone());
+            swap(&mut self.free, removed.clone(), moved.clone());
+            if !self.fixed.is_empty() {
+                swap(&mut self.fixed, removed, moved);
             }
         });
-        swap_list(&mut self.slot_ends, index, |gone, moved| {
-            swap(&mut self.slots, gone, moved);
+        swap_list(&mut self.slot_ends, index, |removed, moved| {
+            swap(&mut self.slots, removed, moved);
         });
         self.factors.swap_remove(index);
         self.entries.swap_remove(index);
@@ -59,13 +59,13 @@ impl<F: Kernel> BatchOf<F> {
     }
 
     /// Sets the fixed variables and directions of a factor.
-    pub(super) fn set_held(&mut self, index: usize, starts: &[u32], held: &[u32]) {
+    pub(super) fn set_fixed_directions(&mut self, index: usize, starts: &[u32], fixed: &[u32]) {
         let range = Self::range(&self.ends, index);
-        if self.held.is_empty() && held.iter().any(|h| *h != 0) {
-            self.held.resize(self.index.len(), 0);
+        if self.fixed.is_empty() && fixed.iter().any(|h| *h != 0) {
+            self.fixed.resize(self.index.len(), 0);
         }
-        if !self.held.is_empty() {
-            self.held[range.clone()].copy_from_slice(held);
+        if !self.fixed.is_empty() {
+            self.fixed[range.clone()].copy_from_slice(fixed);
         }
         self.starts[range.clone()].copy_from_slice(starts);
         let free = starts.iter().map(|start| *start != FIXED);

@@ -14,9 +14,9 @@ pub(super) const CHUNK: usize = 16;
 const WINDOW: usize = 64 * CHUNK;
 /// Duration in seconds above which a pass runs on several threads. Waking them has a cost. Zero in debug
 /// builds, so that tests cover the threads.
-const PARALLEL: f64 = if cfg!(debug_assertions) { 0.0 } else { 2e-3 };
+const PARALLEL_SECONDS: f64 = if cfg!(debug_assertions) { 0.0 } else { 2e-3 };
 /// Duration of a cost evaluation, as an approximate share of a linearization.
-pub(super) const COST: f64 = 0.2;
+pub(super) const COST_SHARE: f64 = 0.2;
 
 /// Buffers for one chunk.
 #[derive(Clone)]
@@ -63,9 +63,9 @@ impl<F: Kernel> BatchOf<F> {
             work.r[k].as_mut_slice().copy_from_slice(value.as_ref());
         }
         self.arch.dispatch(Whiten { batch: self, first, active, work });
-        let cost = self.weigh(first, &mut work.w[..active.len()], active);
+        let cost = self.weights_from_norms(first, &mut work.w[..active.len()], active);
         let not_finite = if cost.is_finite() { None } else { self.find_not_finite(first, active, work) };
-        work.evaluation = Evaluation { cost, inactive, left: 0, not_finite };
+        work.evaluation = Evaluation { cost, inactive, became_undefined: 0, not_finite };
     }
 
     /// Returns the factor that makes the cost of a chunk infinite or NaN. If only the sum overflows,
@@ -73,7 +73,7 @@ impl<F: Kernel> BatchOf<F> {
     fn find_not_finite(&self, first: usize, active: &[bool], work: &Work<F>) -> Option<usize> {
         let cost = |k: usize| {
             let squared = work.r[k].as_slice().iter().map(|x| x * x).sum();
-            self.weigh(first + k, &mut [squared], &[true])
+            self.weights_from_norms(first + k, &mut [squared], &[true])
         };
         let active = (0..active.len()).filter(|k| active[*k]);
         let bad = active.clone().find(|k| !cost(*k).is_finite());
@@ -84,10 +84,10 @@ impl<F: Kernel> BatchOf<F> {
     /// Replaces squared norms by weights and returns ½ Σ ρ, in one virtual call. Inactive factors have norm
     /// 0.
     #[inline(always)]
-    pub(super) fn weigh(&self, first: usize, squared: &mut [f64], active: &[bool]) -> f64 {
+    pub(super) fn weights_from_norms(&self, first: usize, squared: &mut [f64], active: &[bool]) -> f64 {
         let cost = match self.weights.get(first..first + squared.len()) {
             None => self.robust(first, squared),
-            Some(weights) => self.reweigh(first, squared, weights),
+            Some(weights) => self.scaled_weights(first, squared, weights),
         };
         for (w, active) in squared.iter_mut().zip(active) {
             if !active {
@@ -101,14 +101,14 @@ impl<F: Kernel> BatchOf<F> {
     #[inline(always)]
     pub(super) fn robust(&self, first: usize, squared: &mut [f64]) -> f64 {
         match &self.losses {
-            Some(losses) => losses.weigh(first, squared),
+            Some(losses) => losses.weights_from_norms(first, squared),
             None => squared.iter_mut().map(|s| 0.5 * std::mem::replace(s, 1.0)).sum(),
         }
     }
 
     /// Like `robust`, with each factor multiplied by its weight. One call per factor, since a loss returns
     /// the sum of its costs.
-    fn reweigh(&self, first: usize, squared: &mut [f64], weights: &[f64]) -> f64 {
+    fn scaled_weights(&self, first: usize, squared: &mut [f64], weights: &[f64]) -> f64 {
         let one = |(k, (s, weight)): (usize, (&mut f64, &f64))| {
             let cost = self.robust(first + k, std::slice::from_mut(s));
             *s *= weight;
@@ -149,7 +149,7 @@ impl<F: Kernel> BatchOf<F> {
                 continue;
             }
             let Some(s) = self.squared(columns, i) else {
-                out.left += 1;
+                out.became_undefined += 1;
                 continue;
             };
             squared[k] = s;
@@ -157,7 +157,7 @@ impl<F: Kernel> BatchOf<F> {
                 out.not_finite = Some(self.entries[i] as usize);
             }
         }
-        out.cost = self.weigh(first, &mut squared[..len], active);
+        out.cost = self.weights_from_norms(first, &mut squared[..len], active);
         out
     }
 
@@ -203,7 +203,7 @@ impl<F: Kernel> BatchOf<F> {
 
     /// Returns whether threads pay off for this share of a linearization's work.
     pub(super) fn in_parallel(&self, share: f64) -> bool {
-        share * self.alone > PARALLEL && rayon::current_num_threads() > 1
+        share * self.alone > PARALLEL_SECONDS && rayon::current_num_threads() > 1
     }
 
     pub(super) fn linearize_alone(
@@ -216,7 +216,7 @@ impl<F: Kernel> BatchOf<F> {
         let mut total = Evaluation::default();
         for (n, active) in active.chunks_mut(CHUNK).enumerate() {
             self.evaluate(columns, n * CHUNK, active, &mut work);
-            total = total.and(work.evaluation);
+            total = total.merge(work.evaluation);
             self.scatter(n * CHUNK, active, &work, to);
         }
         total
@@ -236,7 +236,7 @@ impl<F: Kernel> BatchOf<F> {
         for (first, len) in runs(indices) {
             let active = &mut active[first..first + len];
             self.evaluate(columns, first, active, &mut work);
-            total = total.and(work.evaluation);
+            total = total.merge(work.evaluation);
             self.scatter(first, active, &work, to);
         }
         self.active = active;
@@ -257,7 +257,7 @@ impl<F: Kernel> BatchOf<F> {
         };
         let mut add = |mut total: Evaluation, n: usize, active: &[bool], work: &[Work<F>]| {
             for (k, (work, active)) in work.iter().zip(active.chunks(CHUNK)).enumerate() {
-                total = total.and(work.evaluation);
+                total = total.merge(work.evaluation);
                 self.scatter(n * WINDOW + k * CHUNK, active, work, to);
             }
             total
@@ -320,14 +320,14 @@ impl<F: Kernel> WithSimd for Whiten<'_, F> {
             batch.whiteners.whiten(i, r);
             work.w[k] = r.iter().map(|x| x * x).sum();
             let range = BatchOf::<F>::range(&batch.ends, i);
-            let held = if batch.held.is_empty() { &[][..] } else { &batch.held[range] };
+            let fixed = if batch.fixed.is_empty() { &[][..] } else { &batch.fixed[range] };
             F::each(
                 &mut work.j[k],
                 #[inline(always)]
                 |a, block| {
                     batch.whiteners.whiten(i, block);
-                    if let Some(held) = held.get(a) {
-                        hold::<F::Dim>(*held, block);
+                    if let Some(fixed) = fixed.get(a) {
+                        clear_fixed_columns::<F::Dim>(*fixed, block);
                     }
                 },
             );
@@ -363,9 +363,9 @@ impl<F: Kernel> WithSimd for Add<'_, '_, F> {
 
 /// Sets the columns of fixed directions to zero.
 #[inline(always)]
-fn hold<R: Dimension>(held: u32, block: &mut [f64]) {
+fn clear_fixed_columns<R: Dimension>(fixed: u32, block: &mut [f64]) {
     for (c, column) in block.chunks_exact_mut(R::N).enumerate() {
-        if held >> c & 1 == 1 {
+        if fixed >> c & 1 == 1 {
             column.fill(0.0);
         }
     }

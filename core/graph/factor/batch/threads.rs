@@ -10,6 +10,6 @@ pub(super) fn join(a: Task<'_>, b: Task<'_>) {
 }
 
 /// Runs a task on a thread of the pool, so that each [`join`] in it is already inside the pool.
-pub(super) fn enter(task: Task<'_>) {
+pub(super) fn run_in_pool(task: Task<'_>) {
     rayon::scope(|_| task());
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 /// registers.
 const COLUMNS: usize = 4;
 /// Multiplications above which a front counts as large.
-const LARGE: usize = 1 << 24;
+const LARGE_FRONT: usize = 1 << 24;
 /// Threads share an update from this number of multiplications on, and from this number per entry of the
 /// update. Below these, collecting the entries takes longer than the threads save. Debug builds use small
 /// limits, so that tests cover small problems too.
@@ -31,7 +31,7 @@ pub fn eliminate<S: Simd, const REPLACE: bool>(
     memory: &mut Scratch,
 ) -> Result<(), usize> {
     let height = panel.len() / width;
-    if height * height * width >= LARGE {
+    if height * height * width >= LARGE_FRONT {
         return large::eliminate::<REPLACE>(panel, update, width, memory);
     }
     for first in (0..width).step_by(COLUMNS) {

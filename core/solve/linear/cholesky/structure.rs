@@ -151,12 +151,12 @@ impl Structure {
         for g in (0..groups.len()).rev().filter(|g| groups[*g].parent != ROOT) {
             self.nodes[g].level = self.nodes[groups[g].parent as usize].level + 1;
         }
-        self.open_early();
+        self.mark_early_fronts();
     }
 
     /// Finds the early fronts: fronts whose children's updates would need much more memory than the front,
     /// as of a camera with thousands of points. They must exist before their first descendant.
-    fn open_early(&mut self) {
+    fn mark_early_fronts(&mut self) {
         let mut first: Vec<u32> = (0..self.nodes.len() as u32).collect();
         let mut waiting = vec![0_usize; self.nodes.len()];
         for n in 0..self.nodes.len() {

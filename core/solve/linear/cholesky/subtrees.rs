@@ -3,14 +3,14 @@ use crate::linear::cholesky::structure::Structure;
 use std::ops::Range;
 
 /// Largest share of the total work in one subtree, so that the work divides evenly among several threads.
-const LARGEST: f64 = 1.0 / 12.0;
+const MAX_SUBTREE_SHARE: f64 = 1.0 / 12.0;
 /// Smallest share of the total work that is worth a task.
-const SMALLEST: f64 = 1.0 / 400.0;
+const MIN_TASK_SHARE: f64 = 1.0 / 400.0;
 
 /// Smallest share of the total work that parallelism must save, because threads have to synchronize.
-const SAVED: f64 = 0.05;
+const MIN_SAVED_SHARE: f64 = 0.05;
 /// Work per value of an update that a subtree passes on, because the value has left the caches by then.
-const HANDED_ON: f64 = 20.0;
+const WORK_PER_VALUE: f64 = 20.0;
 
 /// Returns disjoint ranges of nodes. Each is a whole subtree with the root as its last node. The remaining
 /// nodes are above these, or in small subtrees. Empty if more threads would save almost nothing.
@@ -34,16 +34,16 @@ pub(crate) fn subtrees(structure: &Structure, threads: usize) -> Vec<Range<usize
     let (mut shared, mut largest, mut handed_on) = (0.0, 0.0_f64, 0.0);
     for i in (0..n).rev() {
         let is_free = parent[i].is_none_or(|p: usize| is_above[p]);
-        if is_free && work[i] > LARGEST * total {
+        if is_free && work[i] > MAX_SUBTREE_SHARE * total {
             is_above[i] = true;
-        } else if is_free && work[i] > SMALLEST * total {
+        } else if is_free && work[i] > MIN_TASK_SHARE * total {
             found.push(begin[i]..i + 1);
             (shared, largest) = (shared + work[i], largest.max(work[i]));
             handed_on += (structure.nodes[i].below as f64).powi(2);
         }
     }
-    let saved = shared - largest.max(shared / threads as f64) - HANDED_ON * handed_on;
-    if saved < SAVED * total {
+    let saved = shared - largest.max(shared / threads as f64) - WORK_PER_VALUE * handed_on;
+    if saved < MIN_SAVED_SHARE * total {
         return vec![];
     }
     found.reverse();

@@ -1,7 +1,7 @@
 //! Couplings of blocks, as a graph.
 
 /// The rest of a graph counts as dense once it has this multiple of the couplings of the whole graph.
-const DENSE: usize = 32;
+const DENSE_MULTIPLE: usize = 32;
 
 /// An undirected graph with weights, in compressed rows, without loops or repeated edges.
 #[derive(Debug, Clone, Default)]
@@ -146,7 +146,7 @@ impl Adjacency {
             around.push(boundary);
         }
         let coupled: usize = around.iter().map(|around| around.len().pow(2)).sum();
-        if coupled > DENSE * (self.neighbours.len() + self.len()) {
+        if coupled > DENSE_MULTIPLE * (self.neighbours.len() + self.len()) {
             return self.induced(rest);
         }
         let (mut seen, mut seen_part) = (vec![NONE; self.len()], vec![NONE; around.len()]);

@@ -5,7 +5,7 @@ use super::minimum_degree;
 use super::separator::{self, SEPARATOR};
 
 /// Pieces of at most this many vertices are ordered by minimum degree.
-const PIECE: usize = 120;
+const MAX_PIECE: usize = 120;
 
 /// Returns an elimination order of the vertices; `None` if there is no memory.
 pub(crate) fn nested_dissection(graph: &Adjacency) -> Option<Vec<usize>> {
@@ -20,7 +20,7 @@ pub(crate) fn nested_dissection(graph: &Adjacency) -> Option<Vec<usize>> {
                 continue;
             }
         };
-        let sides = if graph.len() > PIECE { separator::separate(&graph) } else { vec![] };
+        let sides = if graph.len() > MAX_PIECE { separator::separate(&graph) } else { vec![] };
         let is_split = [0, 1].iter().all(|side| sides.contains(side));
         if !is_split {
             order.extend(minimum_degree::minimum_degree(&graph)?.into_iter().map(|v| of[v]));

@@ -11,22 +11,22 @@ use std::collections::BinaryHeap;
 pub(crate) const SEPARATOR: u8 = 2;
 
 /// Graphs of at most this many vertices are not coarsened further.
-const SMALL: usize = 80;
+const COARSEST_VERTICES: usize = 80;
 /// Number of splits of a small graph, each grown from a different vertex.
-const TRIES: usize = 8;
+const SPLITS: usize = 8;
 /// Largest share of the total weight on one side.
-const LARGEST: f64 = 0.6;
+const MAX_SIDE_SHARE: f64 = 0.6;
 /// Maximum number of passes of a refinement.
-const PASSES: usize = 4;
+const MAX_PASSES: usize = 4;
 /// A pass ends after this many moves without improvement.
-const PATIENCE: usize = 40;
+const MAX_IDLE_MOVES: usize = 40;
 
 /// Returns for each vertex its side, 0 or 1, or [`SEPARATOR`]. No edge connects the two sides.
 pub(crate) fn separate(graph: &Adjacency) -> Vec<u8> {
     let mut levels: Vec<(Adjacency, Vec<u32>)> = vec![];
     loop {
         let finest = levels.last().map_or(graph, |(graph, _)| graph);
-        if finest.len() <= SMALL {
+        if finest.len() <= COARSEST_VERTICES {
             break;
         }
         let (coarser, into) = finest.coarsen();
@@ -50,8 +50,8 @@ pub(crate) fn separate(graph: &Adjacency) -> Vec<u8> {
 /// Returns the best of several splits of a small graph.
 fn split(graph: &Adjacency) -> Vec<u8> {
     let n = graph.len();
-    let candidates = (0..TRIES.min(n)).map(|i| {
-        let mut state = State::new(graph, grown(graph, i * n / TRIES.min(n)));
+    let candidates = (0..SPLITS.min(n)).map(|i| {
+        let mut state = State::new(graph, grown(graph, i * n / SPLITS.min(n)));
         state.refine();
         (state.score(), state.sides)
     });
@@ -114,7 +114,7 @@ impl<'a> State<'a> {
     fn new(graph: &'a Adjacency, sides: Vec<u8>) -> Self {
         let mut weights = [0; 3];
         sides.iter().zip(&graph.weights).for_each(|(side, w)| weights[*side as usize] += u64::from(*w));
-        let largest = (graph.total_weight() as f64 * LARGEST) as u64;
+        let largest = (graph.total_weight() as f64 * MAX_SIDE_SHARE) as u64;
         let around = |v: usize| {
             let mut around = [0; 3];
             for u in graph.neighbours(v).iter().map(|u| *u as usize) {
@@ -165,7 +165,7 @@ impl<'a> State<'a> {
     }
 
     fn refine(&mut self) {
-        for _ in 0..PASSES {
+        for _ in 0..MAX_PASSES {
             if !self.pass() {
                 break;
             }
@@ -189,7 +189,7 @@ impl<'a> State<'a> {
         // for each vertex, the last move that increased its gain on that side
         let mut gained = vec![0; self.sides.len()];
         let mut in_vain = 0;
-        while in_vain < PATIENCE {
+        while in_vain < MAX_IDLE_MOVES {
             let Some((_, v, side)) = self.next(&mut heaps, &locked) else { break };
             let v = v as usize;
             locked[v] = true;

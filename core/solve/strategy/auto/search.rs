@@ -1,13 +1,13 @@
 //! Search from further starts, if the given values lead to no minimum.
 use super::watch::{InDomain, Pause, Watch};
-use super::{Auto, DAMPING};
+use super::{Auto, INITIAL_DAMPING};
 use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::outcome::Termination;
 use crate::problem::Problem;
 use crate::strategy::dogleg::Dogleg;
 use crate::strategy::optimizer::Optimizer;
-use crate::strategy::start::{Given, Start};
+use crate::strategy::start::{GivenStart, Start};
 use manifactor_document::Node;
 use manifactor_graph::catalogue::{self, Kind};
 use manifactor_graph::checked::Positive;
@@ -17,7 +17,7 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 /// Damping of the first step after negligible damping has failed.
-const REFUSED: Positive = Positive::literal(1e-5);
+const RETRY_DAMPING: Positive = Positive::literal(1e-5);
 
 /// Initial values of a solve.
 pub(crate) struct Point {
@@ -33,7 +33,7 @@ pub(crate) struct Point {
 fn registered() -> &'static [Box<dyn Start>] {
     static REGISTERED: OnceLock<Vec<Box<dyn Start>>> = OnceLock::new();
     REGISTERED.get_or_init(|| {
-        let others = catalogue::entries(<dyn Start>::NAME).into_iter().filter(|e| e.name != Given::NAME);
+        let others = catalogue::entries(<dyn Start>::NAME).into_iter().filter(|e| e.name != GivenStart::NAME);
         others.filter_map(|entry| entry.read::<dyn Start>(&Node::empty_table()).ok()).collect()
     })
 }
@@ -81,13 +81,13 @@ impl Auto {
         let looking = clock.elapsed().as_secs_f64();
         outcome.times.other += looking;
         outcome.times.total += looking;
-        watch.sleep();
+        watch.disable_pausing();
         // a start that competes with a known minimum gets at most the iterations that the minimum took
         let is_rival = is_minimum(&outcome.termination);
         let bounded = self.at_most(if is_rival { outcome.iterations } else { usize::MAX });
         for point in points {
             tracing::debug!(cost = point.cost, inactive = point.inactive, "another start");
-            problem.model.put(&point.values);
+            problem.model.set_values(&point.values);
             let next = bounded.solve_from(&point, problem, watch);
             let better = (next.inactive, next.final_cost) <= (outcome.inactive, outcome.final_cost);
             let is_settled = is_minimum(&next.termination) && (better || is_rival);
@@ -101,7 +101,7 @@ impl Auto {
         }
         if !watch.stopped && !is_minimum(&outcome.termination) {
             // last attempt: a trust region does not damp all directions equally
-            problem.model.put(values);
+            problem.model.set_values(values);
             let dogleg = Dogleg { stop: self.stop.clone(), linear: self.linear.clone(), ..Dogleg::default() };
             let next = dogleg.descend(problem, watch);
             let better = is_minimum(&next.termination)
@@ -111,7 +111,7 @@ impl Auto {
             }
             outcome = outcome.then(next, better);
         }
-        problem.model.put(&best);
+        problem.model.set_values(&best);
         problem.linearize();
         outcome
     }
@@ -133,9 +133,11 @@ impl Auto {
         let outcome = self.full_steps(problem, &mut watch);
         let InDomain { observer, has_left } = watch;
         match outcome.termination {
-            Termination::Stalled { .. } => outcome.then(self.damped(DAMPING, problem, observer), true),
+            Termination::Stalled { .. } => {
+                outcome.then(self.damped(INITIAL_DAMPING, problem, observer), true)
+            }
             Termination::Interrupted if has_left => {
-                outcome.then(self.damped(REFUSED, problem, observer), true)
+                outcome.then(self.damped(RETRY_DAMPING, problem, observer), true)
             }
             _ => outcome,
         }
@@ -151,8 +153,8 @@ pub(super) fn is_minimum(termination: &Termination) -> bool {
 fn here(watch: &Watch<'_>, outcome: &Outcome, values: &Values) -> Option<Point> {
     let damping = match watch.pause? {
         _ if outcome.termination != Termination::Interrupted => return None,
-        Pause::Rise { .. } | Pause::Undefined => Some(REFUSED),
-        Pause::Long { damping } => Positive::new(damping.max(*DAMPING)).ok(),
+        Pause::Rise { .. } | Pause::Undefined => Some(RETRY_DAMPING),
+        Pause::Long { damping } => Positive::new(damping.max(*INITIAL_DAMPING)).ok(),
     };
     let (inactive, cost) = (outcome.inactive, outcome.final_cost);
     Some(Point { inactive, cost, values: values.clone(), damping })

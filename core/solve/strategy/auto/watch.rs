@@ -50,7 +50,7 @@ impl<'a> Watch<'a> {
     }
 
     /// Disables pausing, so that solves run to their end.
-    pub(super) fn sleep(&mut self) {
+    pub(super) fn disable_pausing(&mut self) {
         (self.is_awake, self.pause) = (false, None);
     }
 

@@ -1,11 +1,11 @@
 //! Records of the steps of a solve, and its outcome.
-use super::{Descent, Step};
+use super::{Descent, TrialStep};
 use crate::outcome::{IterationRecord, Outcome, Stall, Termination, Undetermined};
 
 impl Descent<'_> {
     /// Records the last trial step, and passes it to the observer.
-    pub fn record(&mut self, step: &Step, accepted: bool) {
-        let defined = self.trial.left == 0 && self.trial.cost.is_finite();
+    pub fn record(&mut self, step: &TrialStep, accepted: bool) {
+        let defined = self.trial.became_undefined == 0 && self.trial.cost.is_finite();
         let record = IterationRecord {
             iteration: self.iterations,
             cost: self.at.cost,
@@ -41,17 +41,17 @@ impl Descent<'_> {
         let solve = self.clock.elapsed().as_secs_f64();
         times.total = solve + self.compile;
         times.other = (solve - times.stages()).max(0.0);
-        let untouched = self.problem.untouched();
+        let unconstrained = self.problem.unconstrained();
         let moving = match termination {
             Termination::MaxIterations if self.iterations > 0 => self.problem.moving(),
             _ => None,
         };
-        let termination = match (&untouched, termination) {
+        let termination = match (&unconstrained, termination) {
             // a minimum, but these variables are undetermined
             (
-                Some(untouched),
+                Some(unconstrained),
                 Termination::Converged { .. } | Termination::Stalled { reason: Stall::Jump },
-            ) => Termination::Indeterminate(untouched.clone()),
+            ) => Termination::Indeterminate(unconstrained.clone()),
             (_, termination) => termination,
         };
         Outcome {
@@ -61,7 +61,7 @@ impl Descent<'_> {
             termination,
             undetermined,
             moving,
-            untouched,
+            unconstrained,
             factors: self.problem.factors(),
             inactive: self.at.inactive,
             inactive_factors: self.problem.inactive_factors(),

@@ -9,30 +9,30 @@ use manifactor_graph::checked::NotNegative;
 use nalgebra::DMatrix;
 
 /// Maximum number of escapes in one solve.
-const ESCAPES: usize = 10;
+const MAX_ESCAPES: usize = 10;
 /// Step of the test, as a share of a variable's standard deviation.
-const SHARE: f64 = 0.1;
+const STEP_SHARE: f64 = 0.1;
 /// Maximum step of the test, in tangent units.
-const MOST: f64 = 0.05;
+const MAX_STEP: f64 = 0.05;
 /// Step of the test along a flat direction, without a slope of any factor, in tangent units.
-const UNKNOWN: f64 = 1e-3;
+const FLAT_STEP: f64 = 1e-3;
 /// Share of a factor's cost below which its second difference is rounding.
-const ROUNDING: f64 = 1e-8;
+const ROUNDING_SHARE: f64 = 1e-8;
 /// Step for differences of gradients, as a share of the step of the test.
-const DIFFERENCE: f64 = 1e-2;
+const DIFFERENCE_SHARE: f64 = 1e-2;
 /// Maximum number of products with the Hessian.
-const PRODUCTS: usize = 12;
+const MAX_PRODUCTS: usize = 12;
 /// Smallest curvature, as a share of JᵀJ's, above which the test accepts the minimum.
-const SOUND: f64 = 0.5;
+const MIN_CURVATURE: f64 = 0.5;
 /// Maximum number of flat directions that are tried one by one.
-const FLAT: usize = 32;
+const MAX_FLAT_DIRECTIONS: usize = 32;
 /// Shares of the diagonal that are added to JᵀJ; the first that makes it positive definite is used.
-const SHIFTS: [f64; 3] = [1e-10, 1e-6, 1e-3];
+const DIAGONAL_SHIFTS: [f64; 3] = [1e-10, 1e-6, 1e-3];
 /// Lower bound of diagonal entries, as a share of the largest one.
-const FLOOR: f64 = 1e-9;
+const DIAGONAL_FLOOR: f64 = 1e-9;
 /// Relative tolerance above which a solve is not tested, such as the inner solves of graduated
 /// non-convexity.
-const ROUGH: f64 = 1e-4;
+const MAX_TOLERANCE: f64 = 1e-4;
 
 /// Result of probing all factors on both sides of the estimate.
 struct Probe {
@@ -49,8 +49,8 @@ impl Descent<'_> {
         let Termination::Converged { reason } = termination else { return false };
         let is_zero = *reason == Tolerance::AbsoluteCost && self.at.inactive == 0;
         if is_zero
-            || self.stop.relative_cost > NotNegative::literal(ROUGH)
-            || self.escapes >= ESCAPES
+            || self.stop.relative_cost > NotNegative::literal(MAX_TOLERANCE)
+            || self.escapes >= MAX_ESCAPES
             || self.gradient().is_empty()
         {
             return false;
@@ -63,7 +63,7 @@ impl Descent<'_> {
             return self.at.not_finite.is_none();
         }
         tracing::debug!(bent = probe.bent.iter().filter(|bent| **bent).count(), "probed the ending");
-        let flat: Vec<usize> = self.flat_unknowns().take(FLAT).collect();
+        let flat: Vec<usize> = self.flat_unknowns().take(MAX_FLAT_DIRECTIONS).collect();
         if flat.is_empty() && !probe.bent.contains(&true) {
             return false;
         }
@@ -72,8 +72,10 @@ impl Descent<'_> {
             direction[*i] = steps[*i].abs();
             direction
         };
-        let found = flat.iter().map(unit).any(|direction| self.go_down(&direction))
-            || self.bent_direction(&steps, &probe.bent).is_some_and(|direction| self.go_down(&direction));
+        let found = flat.iter().map(unit).any(|direction| self.descend_along(&direction))
+            || self
+                .negative_curvature(&steps, &probe.bent)
+                .is_some_and(|direction| self.descend_along(&direction));
         self.escapes += usize::from(found);
         found
     }
@@ -87,7 +89,7 @@ impl Descent<'_> {
         let fit = if self.at.inactive > 0 { fit.max(1.0) } else { fit };
         let step = |(i, d): (usize, &f64)| {
             let wave = ((i * 7919 % 104_729) as f64 + 1.0).sin();
-            let size = if *d > 0.0 { (SHARE * fit / d.sqrt()).min(MOST) } else { UNKNOWN };
+            let size = if *d > 0.0 { (STEP_SHARE * fit / d.sqrt()).min(MAX_STEP) } else { FLAT_STEP };
             size * (0.5 + 0.5 * wave.abs()).copysign(wave)
         };
         let mut steps: Vec<f64> = self.problem.system.diagonal().enumerate().map(step).collect();
@@ -120,7 +122,7 @@ impl Descent<'_> {
             }
             let (ahead, behind, here) = (ahead[i], behind[i], here[i]);
             probe.is_singular |= is_inactive[i] && ahead > 0.0 && behind > 0.0;
-            if is_inactive[i] || ahead + behind - 2.0 * here > -ROUNDING * (ahead + behind + here) {
+            if is_inactive[i] || ahead + behind - 2.0 * here > -ROUNDING_SHARE * (ahead + behind + here) {
                 continue;
             }
             for variable in &place.variables {
@@ -134,11 +136,12 @@ impl Descent<'_> {
     /// Returns a direction of negative curvature, if there is one. Uses the Lanczos method in the metric of
     /// JᵀJ, in which all curvatures of a good minimum are close to one. Begins at the unknowns of factors
     /// with negative curvature.
-    fn bent_direction(&mut self, steps: &[f64], bent: &[bool]) -> Option<Vec<f64>> {
+    fn negative_curvature(&mut self, steps: &[f64], bent: &[bool]) -> Option<Vec<f64>> {
         let largest = self.problem.system.largest();
-        let floor = if largest > 0.0 { FLOOR * largest } else { 1.0 };
+        let floor = if largest > 0.0 { DIAGONAL_FLOOR * largest } else { 1.0 };
         let scale: Vec<f64> = self.problem.system.diagonal().map(|d| d.max(floor)).collect();
-        let shift = SHIFTS.into_iter().map(|share| scale.iter().map(|d| share * d).collect::<Vec<f64>>());
+        let shift =
+            DIAGONAL_SHIFTS.into_iter().map(|share| scale.iter().map(|d| share * d).collect::<Vec<f64>>());
         let shift =
             shift.into_iter().find(|shift| self.problem.system.factorize_directly(Some(shift)).is_ok())?;
         self.is_refactorized = true;
@@ -164,7 +167,7 @@ impl Descent<'_> {
         let (mut basis, mut images): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (vec![], vec![]);
         let mut products: Vec<Vec<f64>> = vec![];
         let mut found = None;
-        while basis.len() < PRODUCTS.min(steps.len()) {
+        while basis.len() < MAX_PRODUCTS.min(steps.len()) {
             // orthogonalizing twice is enough (Parlett)
             for (vector, image) in basis.iter().zip(&images).chain(basis.iter().zip(&images)) {
                 let along = dot(&next, image);
@@ -194,7 +197,7 @@ impl Descent<'_> {
                     direction.iter_mut().zip(vector).for_each(|(d, v)| *d += share * v);
                 }
                 found = Some(direction);
-            } else if basis.len() > 2 && eigen.eigenvalues[least] > SOUND {
+            } else if basis.len() > 2 && eigen.eigenvalues[least] > MIN_CURVATURE {
                 break;
             }
             match self.problem.system.cholesky() {
@@ -209,23 +212,23 @@ impl Descent<'_> {
     /// that is not finite.
     fn hessian_product(&mut self, direction: &[f64], steps: &[f64], gradient: &[f64]) -> Option<Vec<f64>> {
         let share = shortest(direction, steps)?;
-        let step: Vec<f64> = direction.iter().map(|d| DIFFERENCE * share * d).collect();
+        let step: Vec<f64> = direction.iter().map(|d| DIFFERENCE_SHARE * share * d).collect();
         self.problem.model.retract(&step);
         self.problem.model.accept();
         let there = self.problem.linearize_keeping_factor();
         let mut product: Vec<f64> = self.problem.system.g.iter().zip(gradient).map(|(a, b)| a - b).collect();
         self.problem.model.accept();
-        product.iter_mut().for_each(|x| *x /= DIFFERENCE * share);
+        product.iter_mut().for_each(|x| *x /= DIFFERENCE_SHARE * share);
         self.problem.system.held.iter().for_each(|i| product[*i] = 0.0);
         (there.not_finite.is_none() && norm(&product).is_finite()).then_some(product)
     }
 
     /// Moves along a direction, forward or backward, as long as the cost falls. Returns whether it falls by
     /// more than the tolerance.
-    fn go_down(&mut self, direction: &[f64]) -> bool {
+    fn descend_along(&mut self, direction: &[f64]) -> bool {
         let steps = self.probe_steps();
         let Some(share) = shortest(direction, &steps) else { return false };
-        let enough = self.at.cost * (1.0 - self.stop.relative_cost.max(ROUNDING));
+        let enough = self.at.cost * (1.0 - self.stop.relative_cost.max(ROUNDING_SHARE));
         let mut best: Option<(f64, Vec<f64>)> = None;
         for sign in [1.0, -1.0] {
             let mut size = sign * share;
@@ -247,7 +250,8 @@ impl Descent<'_> {
     fn cost_beside(&mut self, direction: &[f64], size: f64) -> Option<f64> {
         let step: Vec<f64> = direction.iter().map(|d| size * d).collect();
         let there = self.problem.try_step(&step);
-        (there.left == 0 && there.not_finite.is_none() && there.cost.is_finite()).then_some(there.cost)
+        (there.became_undefined == 0 && there.not_finite.is_none() && there.cost.is_finite())
+            .then_some(there.cost)
     }
 
     fn move_by(&mut self, step: &[f64]) {

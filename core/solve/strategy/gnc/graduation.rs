@@ -2,7 +2,7 @@
 use super::Gnc;
 use crate::observer::{Observer, Quiet};
 use crate::outcome::Termination;
-use crate::outcome::{Outcome, Rejected};
+use crate::outcome::{Outcome, RejectedFactor};
 use crate::problem::Problem;
 use crate::strategy::auto::starts;
 use crate::strategy::levenberg_marquardt::LevenbergMarquardt;
@@ -13,13 +13,13 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Maximum number of rounds until the weights converge; usually two or three.
-const ROUNDS: usize = 10;
+const MAX_ROUNDS: usize = 10;
 /// Thresholds for keeping a factor in the search for further minima, as multiples of the inlier bound.
-const SHARES: [f64; 5] = [1.0, 0.1, 0.03, 10.0, 100.0];
+const THRESHOLD_SHARES: [f64; 5] = [1.0, 0.1, 0.03, 10.0, 100.0];
 /// Relative decrease above which a cost counts as lower, beyond the tolerance of the solves.
-const LESS: f64 = 1e-5;
+const MIN_DECREASE: f64 = 1e-5;
 /// Weight below which a factor is omitted in the search for starts.
-const NEGLIGIBLE: f64 = 1e-4;
+const NEGLIGIBLE_WEIGHT: f64 = 1e-4;
 
 /// A graduated solve in progress.
 pub(super) struct Graduation<'a> {
@@ -55,10 +55,10 @@ impl<'a> Graduation<'a> {
 
     pub(super) fn run(mut self) -> Outcome {
         let (clock, compile) = (Instant::now(), self.problem.times.compile);
-        self.problem.model.weigh(&self.weights);
+        self.problem.model.set_weights(&self.weights);
         let mut outcome = match self.graduate() {
             ControlFlow::Continue(()) => {
-                self.weigh(self.gnc.cost.last());
+                self.update_weights(self.gnc.cost.last());
                 let last = self.gnc.solver.descend(self.problem, self.observer);
                 self.account(last)
             }
@@ -79,17 +79,17 @@ impl<'a> Graduation<'a> {
         let excess = (0..self.costs.len()).filter_map(|i| self.excess(i));
         let mut control = self.gnc.cost.first(excess.fold(0.0, f64::max));
         while let Some(mu) = control {
-            self.weigh(mu);
+            self.update_weights(mu);
             self.step()?;
             let open = self.weights.iter().any(|w| *w > 0.0 && *w < 1.0);
             control = if open { self.gnc.cost.next(mu, self.gnc.step.get()) } else { None };
         }
-        self.settle()?;
+        self.alternate()?;
         // look for better minima nearby, in case an outlier was kept or an inlier rejected
-        let mut shares = SHARES.iter();
+        let mut shares = THRESHOLD_SHARES.iter();
         let mut share = shares.next();
         while let Some(now) = share {
-            let improved = self.settle_from(*now)?;
+            let improved = self.alternate_from(*now)?;
             share = if improved { share } else { shares.next() };
         }
         ControlFlow::Continue(())
@@ -97,7 +97,7 @@ impl<'a> Graduation<'a> {
 
     /// Computes an estimate from the factors with a cost below this share of the inlier bound. Keeps it and
     /// returns `true` if it has a lower robust cost.
-    fn settle_from(&mut self, share: f64) -> ControlFlow<Box<Outcome>, bool> {
+    fn alternate_from(&mut self, share: f64) -> ControlFlow<Box<Outcome>, bool> {
         let within =
             |me: &Self, share: f64| (0..me.costs.len()).filter(|i| me.excess(*i) <= Some(share)).count();
         if share != 1.0 && within(self, share) == within(self, 1.0) {
@@ -107,14 +107,14 @@ impl<'a> Graduation<'a> {
         for i in 0..self.weights.len() {
             self.weights[i] = if self.excess(i) <= Some(share) { 1.0 } else { 0.0 };
         }
-        self.problem.model.weigh(&self.weights);
-        if !self.begin_elsewhere(f64::INFINITY) {
+        self.problem.model.set_weights(&self.weights);
+        if !self.solve_from_best_start(f64::INFINITY) {
             self.solve()?;
         }
-        self.settle()?;
-        let improved = self.robust_cost() < before * (1.0 - LESS);
+        self.alternate()?;
+        let improved = self.robust_cost() < before * (1.0 - MIN_DECREASE);
         if !improved {
-            self.problem.model.put(&values);
+            self.problem.model.set_values(&values);
             self.problem.factor_costs(&mut self.costs);
         }
         ControlFlow::Continue(improved)
@@ -123,19 +123,19 @@ impl<'a> Graduation<'a> {
     /// Computes an estimate for the current weights: the better result of the last estimate and a start.
     fn step(&mut self) -> ControlFlow<Box<Outcome>> {
         let cost = self.solve()?;
-        self.begin_elsewhere(cost);
+        self.solve_from_best_start(cost);
         self.problem.factor_costs(&mut self.costs);
         ControlFlow::Continue(())
     }
 
     /// Alternates between the weights of the robust cost and an estimate for them, until the inliers stay
     /// the same.
-    fn settle(&mut self) -> ControlFlow<Box<Outcome>> {
+    fn alternate(&mut self) -> ControlFlow<Box<Outcome>> {
         let kept = |me: &Self| (0..me.costs.len()).map(|i| me.excess(i) <= Some(1.0)).collect::<Vec<_>>();
         self.problem.factor_costs(&mut self.costs);
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let before = kept(self);
-            self.weigh(self.gnc.cost.last());
+            self.update_weights(self.gnc.cost.last());
             self.solve()?;
             self.problem.factor_costs(&mut self.costs);
             if kept(self) == before {
@@ -167,29 +167,29 @@ impl<'a> Graduation<'a> {
 
     /// Solves with the current weights from the best registered start. Keeps the result and returns `true`
     /// if its cost is below `cost`. The starts get the weights, and so the outliers, by way of the noise.
-    fn begin_elsewhere(&mut self, cost: f64) -> bool {
+    fn solve_from_best_start(&mut self, cost: f64) -> bool {
         let Some(graph) = self.graph else { return false };
         let mut weighed = graph.clone();
         let mut weights = self.weights.iter();
         weighed.factors_mut().retain_mut(|entry| {
             let weight = weights.next().copied().unwrap_or(1.0);
-            if weight < 1.0 && weight > NEGLIGIBLE {
+            if weight < 1.0 && weight > NEGLIGIBLE_WEIGHT {
                 // noise at the limits of f64 stays unchanged
                 entry.noise = entry.noise.weighted(weight).unwrap_or_else(|_| entry.noise.clone());
             }
-            weight > NEGLIGIBLE
+            weight > NEGLIGIBLE_WEIGHT
         });
         let here = self.problem.values();
         let points = starts(&weighed, &here, self.problem);
         let best = points.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         if let Some(point) = &best {
-            self.problem.model.put(&point.values);
+            self.problem.model.set_values(&point.values);
             let there = self.inner.descend(self.problem, &mut Quiet(self.observer));
             if there.final_cost < cost && !matches!(there.termination, Termination::NonFinite { .. }) {
                 return true;
             }
         }
-        self.problem.model.put(&here);
+        self.problem.model.set_values(&here);
         false
     }
 
@@ -198,11 +198,11 @@ impl<'a> Graduation<'a> {
         self.bounds[factor].map(|bound| self.costs[factor] / bound)
     }
 
-    fn weigh(&mut self, mu: f64) {
+    fn update_weights(&mut self, mu: f64) {
         for i in 0..self.weights.len() {
             self.weights[i] = self.excess(i).map_or(1.0, |u| self.gnc.cost.weight(mu, u));
         }
-        self.problem.model.weigh(&self.weights);
+        self.problem.model.set_weights(&self.weights);
     }
 
     fn robust_cost(&self) -> f64 {
@@ -214,9 +214,9 @@ impl<'a> Graduation<'a> {
     }
 
     /// Returns the factors with a cost above their inlier bound.
-    fn rejected(&self) -> Vec<Rejected> {
+    fn rejected(&self) -> Vec<RejectedFactor> {
         let beyond = |i: &usize| self.excess(*i).is_some_and(|u| u > 1.0);
-        let one = |factor: usize| Rejected {
+        let one = |factor: usize| RejectedFactor {
             factor,
             name: self.problem.model.factors[factor].label(),
             keys: self.problem.model.keys(factor),

@@ -69,7 +69,7 @@ impl<'a> Setup<'a> {
             factor: self.factor.erased().as_any(),
             index: &(0..self.spots.len() as u32).collect::<Vec<_>>(),
             starts: &self.starts,
-            held: &self.held,
+            fixed: &self.held,
             slots: &slots,
             whitener: &whitener,
             loss: self.loss,

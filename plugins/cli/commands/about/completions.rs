@@ -7,16 +7,19 @@ use clap_complete::{Shell, generate};
 
 /// Print a script that completes commands and flags in a shell.
 ///
-/// For bash: manifactor completions bash > ~/.local/share/bash-completion/completions/manifactor
+/// For bash, source the script in ~/.bashrc, or write it to
+/// ~/.local/share/bash-completion/completions/manifactor.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor completions bash > manifactor.bash")]
 pub(crate) struct Completions {
     /// The shell.
     #[arg(value_enum)]
     shell: Shell,
 }
 
-/// Print the manual page of the program or of one command: manifactor man > manifactor.1
+/// Print the manual page of the program or of one command.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor man solve > manifactor-solve.1")]
 pub(crate) struct Man {
     /// The command. Default: the program.
     command: Option<String>,
@@ -27,7 +30,7 @@ impl Completions {
     pub(crate) fn run(&self, mut program: Command) -> Status {
         let mut script = vec![];
         generate(self.shell, &mut program, "manifactor", &mut script);
-        output::print_as_is(&script);
+        output::print_bytes(&script);
         Status::Done
     }
 }
@@ -43,15 +46,15 @@ impl Man {
                 Some(command) => command.clone(),
                 None => {
                     return Err(Failure::with_help(
-                        format!("there is no command `{name}`"),
-                        "`manifactor help` lists them",
+                        format!("unknown command `{name}`"),
+                        "`manifactor help` lists the commands",
                     ));
                 }
             },
         };
         let mut page = vec![];
         clap_mangen::Man::new(command).render(&mut page).map_err(Failure::input)?;
-        output::print_as_is(&page);
+        output::print_bytes(&page);
         Ok(Status::Done)
     }
 }

@@ -6,11 +6,16 @@ use crate::reference;
 use crate::status::Status;
 use clap::Args;
 use manifactor::config::nearest;
-use manifactor::graph::catalogue;
+use manifactor::graph::catalogue::{self, Entry};
 use serde_json::json;
+use std::collections::HashSet;
+use std::io::IsTerminal;
 
 /// List the names that a config can use: factors, variables, losses, solvers, sources and more.
+///
+/// On a terminal, each name has a summary. Into a file or a pipe, one name is printed per line.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor list factors")]
 pub(crate) struct List {
     /// One kind only, such as `factors`.
     kind: Option<String>,
@@ -35,20 +40,33 @@ impl List {
         if self.json {
             let rows =
                 entries.iter().map(|e| json!({ "kind": e.kind, "name": e.name, "summary": e.summary() }));
-            output::json(&rows.collect::<Vec<_>>());
+            output::print_json(&rows.collect::<Vec<_>>());
             return Ok(Status::Done);
         }
-        let mut out = String::new();
-        for of_kind in entries.chunk_by(|a, b| a.kind == b.kind) {
-            let mut table = Table::of_words(&[of_kind.first().map_or("", |e| e.kind), "what it is"]);
-            for entry in of_kind {
-                table.row([entry.name, &entry.summary()]);
-            }
-            out += &format!("{}\n\n", table.text());
-        }
-        output::print(&(out + "`manifactor explain NAME` says more.\n"));
+        let text = if std::io::stdout().is_terminal() { tables(&entries) } else { names(&entries) };
+        output::print(&text);
         Ok(Status::Done)
     }
+}
+
+/// A table for each kind, for readers.
+fn tables(entries: &[&'static Entry]) -> String {
+    let mut out = String::new();
+    for of_kind in entries.chunk_by(|a, b| a.kind == b.kind) {
+        let mut table = Table::of_words(&[of_kind.first().map_or("", |e| e.kind), "summary"]);
+        for entry in of_kind {
+            table.row([entry.name, &entry.summary()]);
+        }
+        out += &format!("{}\n\n", table.text());
+    }
+    out + "`manifactor explain NAME` has the details.\n"
+}
+
+/// One name per line, for other programs. A name of several kinds has one line.
+fn names(entries: &[&'static Entry]) -> String {
+    let mut printed = HashSet::new();
+    let new = entries.iter().filter(|entry| printed.insert(entry.name));
+    new.map(|entry| format!("{}\n", entry.name)).collect()
 }
 
 /// Returns the kind for its singular or plural, such as `factor` or `factors`.
@@ -62,7 +80,23 @@ fn known(kind: &str) -> Result<&'static str, Failure> {
     let meant =
         nearest(kind, kinds.iter().copied()).map(|k| format!("did you mean `{k}`? ")).unwrap_or_default();
     Err(Failure::with_help(
-        format!("there is no kind of things called `{kind}`"),
-        format!("{meant}there are {}", kinds.join(", ")),
+        format!("there is no kind `{kind}`"),
+        format!("{meant}the kinds are {}", kinds.join(", ")),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_have_summaries_and_names_have_one_line_each() {
+        let entries = catalogue::all();
+        assert!(tables(&entries).contains("summary"));
+        let names = names(&entries);
+        assert!(entries.iter().all(|entry| names.lines().any(|line| line == entry.name)));
+        let mut lines: Vec<&str> = names.lines().collect();
+        lines.sort_unstable();
+        assert!(lines.windows(2).all(|pair| pair[0] != pair[1]), "{lines:?}");
+    }
 }

@@ -1,23 +1,23 @@
 //! `manifactor schema`: one JSON Schema for editors.
 use crate::failure::Failure;
-use crate::input::graph_file;
 use crate::output;
+use crate::reference::documents::DOCUMENTS;
 use crate::status::Status;
 use clap::{Args, ValueEnum};
 use manifactor::config::Definitions;
-use manifactor::slam::schema::{experiment_root, rules_root, run_root};
 use serde_json::{Value, json};
 
-/// Print the JSON Schema of a document, with which editors complete and check it.
+/// Print the JSON Schema of a kind of document, for completion and checks in editors.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor schema run > run.schema.json")]
 pub(crate) struct Schema {
     /// The kind of document.
     #[arg(value_enum, default_value = "any")]
-    document: Document,
+    document: Choice,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Document {
+enum Choice {
     /// Any kind of document.
     Any,
     /// A literal graph, the input of `solve`.
@@ -32,19 +32,23 @@ enum Document {
 
 impl Schema {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let kind = |name: &str| DOCUMENTS.iter().find(|kind| kind.name == name);
+        let one = match self.document {
+            Choice::Any => None,
+            Choice::Graph => kind("graph"),
+            Choice::Run => kind("run"),
+            Choice::Experiment => kind("experiment"),
+            Choice::Rules => kind("rules"),
+        };
         let mut definitions = Definitions::new();
-        let root = match self.document {
-            Document::Graph => graph_file::root(&mut definitions),
-            Document::Run => run_root(&mut definitions),
-            Document::Experiment => experiment_root(&mut definitions),
-            Document::Rules => rules_root(&mut definitions),
-            Document::Any => {
-                let roots = [graph_file::root, run_root, experiment_root, rules_root];
-                let any = roots.map(|root: fn(&mut Definitions) -> Value| root(&mut definitions));
+        let root = match one {
+            Some(kind) => (kind.root)(&mut definitions),
+            None => {
+                let any: Vec<Value> = DOCUMENTS.iter().map(|kind| (kind.root)(&mut definitions)).collect();
                 json!({ "title": "A document of Manifactor", "anyOf": any })
             }
         };
-        output::json(&definitions.document(root));
+        output::print_json(&definitions.document(root));
         Ok(Status::Done)
     }
 }

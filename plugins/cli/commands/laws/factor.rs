@@ -2,6 +2,7 @@
 use super::linked;
 use crate::failure::Failure;
 use crate::input::choice::named;
+use crate::input::{document, kind};
 use crate::output;
 use crate::status::Status;
 use clap::Args;
@@ -20,6 +21,9 @@ use std::path::PathBuf;
 /// accepts. With --json, the points of the worst entry and of the kinks are included for a sound factor
 /// too. The exit code is 1 if a law is broken.
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  manifactor check-factor bounding_box\n  manifactor check-factor --config examples/03_relations/graph.toml"
+)]
 pub(crate) struct CheckFactor {
     /// The factor, one of `manifactor list factors`. Default with --config: all factors of the graph.
     #[arg(required_unless_present = "config")]
@@ -52,7 +56,7 @@ impl CheckFactor {
         let reports: Vec<_> = subjects.iter().map(|subject| check.run(subject)).collect();
         let holds = reports.iter().all(|report| report.holds());
         if self.json {
-            output::json(&json!({ "holds": holds, "factors": reports }));
+            output::print_json(&json!({ "holds": holds, "factors": reports }));
         } else {
             let texts: Vec<_> = reports.iter().map(|r| r.to_string().trim_end().to_owned()).collect();
             output::print(&(texts.join("\n\n") + "\n"));
@@ -75,7 +79,7 @@ impl CheckFactor {
 
 /// Returns the distinct factors of a graph, around the graph's values.
 fn in_graph(path: &std::path::Path, name: Option<&str>) -> Result<Vec<Subject>, Failure> {
-    let document = Document::open(path)?;
+    let document = document::open(path, kind::LITERAL_GRAPH)?;
     let (graph, values) = read_graph(&document)?;
     let mut subjects: Vec<Subject> = vec![];
     for entry in graph.factors() {
@@ -92,7 +96,10 @@ fn in_graph(path: &std::path::Path, name: Option<&str>) -> Result<Vec<Subject>, 
         });
     }
     if subjects.is_empty() {
-        let what = name.map_or_else(|| "no factors".to_owned(), |name| format!("no factor of type `{name}`"));
+        let what = name.map_or_else(
+            || "the graph has no factors".to_owned(),
+            |name| format!("the graph has no factor of type `{name}`"),
+        );
         return Err(Failure::input(format!("{}: {what}", path.display())));
     }
     Ok(subjects)

@@ -13,6 +13,7 @@ use manifactor::testing::ManifoldCheck;
 /// registered strategy, and at its singular points. If a law is broken, the two points and the tangent
 /// vector are shown and the exit code is 1.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor check-manifold se3")]
 pub(crate) struct CheckManifold {
     /// The type, one of `manifactor list variables`.
     name: String,
@@ -33,7 +34,7 @@ impl CheckManifold {
         let check = ManifoldCheck { points: self.points as usize, seed: self.seed };
         let report = check.run(entry).map_err(Failure::input)?;
         match self.json {
-            true => output::json(&report),
+            true => output::print_json(&report),
             false => output::print(&report.to_string()),
         }
         Ok(if report.holds() { Status::Done } else { Status::Broken })

@@ -22,7 +22,7 @@ enum Kind {
     /// All columns except the first, by decreasing priority, and the number of left-aligned columns with
     /// names.
     Numbers {
-        kept_first: Vec<usize>,
+        by_priority: Vec<usize>,
         names: usize,
     },
     Words,
@@ -32,8 +32,8 @@ impl Table {
     /// Creates a table of right-aligned numbers; the first column has names. If space is short, the left
     /// columns have priority.
     pub(crate) fn of_numbers(header: &[&str]) -> Self {
-        let kept_first = (1..header.len()).collect();
-        Self { kind: Kind::Numbers { kept_first, names: 1 }, ..Self::of_words(header) }
+        let by_priority = (1..header.len()).collect();
+        Self { kind: Kind::Numbers { by_priority, names: 1 }, ..Self::of_words(header) }
     }
 
     /// Creates a table of left-aligned words; the last column has sentences.
@@ -43,18 +43,18 @@ impl Table {
     }
 
     /// Gives the columns `names` the highest priority, in this order.
-    pub(crate) fn keeping(mut self, names: &[&str]) -> Self {
-        if let Kind::Numbers { kept_first, .. } = &mut self.kind {
+    pub(crate) fn with_priority(mut self, names: &[&str]) -> Self {
+        if let Kind::Numbers { by_priority, .. } = &mut self.kind {
             let rank = |column: &usize| {
                 names.iter().position(|name| self.header.get(*column).is_some_and(|h| h == name))
             };
-            kept_first.sort_by_key(|column| rank(column).unwrap_or(names.len()));
+            by_priority.sort_by_key(|column| rank(column).unwrap_or(names.len()));
         }
         self
     }
 
     /// Sets the number of left-aligned columns with names.
-    pub(crate) fn naming(mut self, columns: usize) -> Self {
+    pub(crate) fn with_name_columns(mut self, columns: usize) -> Self {
         if let Kind::Numbers { names, .. } = &mut self.kind {
             *names = columns;
         }
@@ -75,7 +75,7 @@ impl Table {
     /// Formats the table for a width, without trailing spaces.
     pub(crate) fn at(&self, width: usize) -> String {
         let lines = match &self.kind {
-            Kind::Numbers { kept_first, names } => self.numbers(kept_first, *names, width),
+            Kind::Numbers { by_priority, names } => self.numbers(by_priority, *names, width),
             Kind::Words => self.words(width),
         };
         let lines = lines.unwrap_or_else(|| self.turned(width));
@@ -105,17 +105,17 @@ impl Table {
     }
 
     /// Returns `None` if not even the first column of numbers fits next to the names.
-    fn numbers(&self, kept_first: &[usize], names: usize, width: usize) -> Option<Vec<String>> {
+    fn numbers(&self, by_priority: &[usize], names: usize, width: usize) -> Option<Vec<String>> {
         let mut shown = vec![0];
         let mut taken = self.column_width(0);
-        for column in kept_first {
+        for column in by_priority {
             let wide = self.column_width(*column) + GAP;
             if taken + wide <= width {
                 taken += wide;
                 shown.push(*column);
             }
         }
-        if taken > width || (shown.len() == 1 && !kept_first.is_empty()) {
+        if taken > width || (shown.len() == 1 && !by_priority.is_empty()) {
             return None;
         }
         shown.sort_unstable();

@@ -1,4 +1,4 @@
-"""Runs and sessions in the rerun viewer: `report.to_rerun()`, `session.to_rerun()`. Needs
+"""Runs and smoothers in the rerun viewer: `report.to_rerun()`, `smoother.to_rerun()`. Needs
 `manifactor[rerun]`."""
 
 from __future__ import annotations

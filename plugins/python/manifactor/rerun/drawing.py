@@ -1,4 +1,4 @@
-"""Drawing of poses, objects, cameras and boxes, shared by runs and sessions."""
+"""Drawing of poses, objects, cameras and boxes, shared by runs and smoothers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
-#: The timelines: the timestamps of the frames, and the steps of a solve or the updates of a session.
+#: The timelines: the timestamps of the frames, and the steps of a solve or the updates of a smoother.
 TIME, ITERATION = "time", "iteration"
 #: Colours by meaning.
 COLOURS = {"estimate": (31, 119, 180), "initial": (255, 127, 14), "odometry": (160, 160, 160), "truth": (44, 160, 44)}

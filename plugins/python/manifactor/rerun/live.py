@@ -1,4 +1,4 @@
-"""A session in the viewer, update by update: `session.to_rerun()`."""
+"""A smoother in the viewer, update by update: `smoother.to_rerun()`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from .._native import FactorId, Graph, Session, Values
+from .._native import FactorId, Graph, Smoother, Values
 from . import drawing
 from .drawing import ITERATION, TIME
 
@@ -22,8 +22,8 @@ BOXES = ("bounding_box", "tangent_planes")
 
 
 class Live:
-    """Logs the state of a session after each update; call `push` and `update` of this object instead of the
-    session's.
+    """Logs the state of a smoother after each update; call `push` and `update` of this object instead of the
+    smoother's.
 
     The entities below the recording's name are the newest pose (`camera`, with its pinhole and boxes if
     there are factors of boxes), the line through all poses, including removed ones (`estimate/trajectory`),
@@ -32,10 +32,10 @@ class Live:
     update, and `time`, if `update` is called with seconds.
     """
 
-    def __init__(self, session: Session, path: str | os.PathLike[str] | None, name: str, every: int) -> None:
+    def __init__(self, smoother: Smoother, path: str | os.PathLike[str] | None, name: str, every: int) -> None:
         if every < 1:
             raise ValueError(f"every: expected a number of updates from 1, got {every}")
-        self.session, self.every, self.updates = session, every, 0
+        self.smoother, self.every, self.updates = smoother, every, 0
         self.recording = drawing.recording(path, name)
         self._at = rr.escape_entity_path_part(name)
         #: Last known position of each pose by key, shape (3,).
@@ -44,9 +44,14 @@ class Live:
         self._seen: dict[str, list[tuple[str, list[float]]]] = {}
         self._camera: dict[str, Any] | None = None
 
+    @property
+    def session(self) -> Smoother:
+        """Alias of `smoother`, for code that was written for earlier versions."""
+        return self.smoother
+
     def push(self, graph: Graph, values: Values) -> list[FactorId]:
-        """Like `Session.push`; boxes of the graph are shown after the next update."""
-        ids = self.session.push(graph, values)
+        """Like `Smoother.push`; boxes of the graph are shown after the next update."""
+        ids = self.smoother.push(graph, values)
         if any(name in BOXES for name in graph.types()):
             for number in range(len(graph)):
                 entry = graph[number]
@@ -57,10 +62,10 @@ class Live:
         return ids
 
     def update(self, seconds: float | None = None) -> dict[str, Any]:
-        """Like `Session.update`, but logs the result too. `seconds` is the timestamp of the frame on the
+        """Like `Smoother.update`, but logs the result too. `seconds` is the timestamp of the frame on the
         timeline `time`."""
         begun = time.perf_counter()
-        account = self.session.update()
+        account = self.smoother.update()
         latency = time.perf_counter() - begun
         self.recording.set_time(ITERATION, sequence=self.updates)
         if seconds is not None:
@@ -69,7 +74,7 @@ class Live:
             self.recording.disable_timeline(TIME)
         self._log("latency", rr.Scalars(latency))
         if self.updates % self.every == 0:
-            self._log("cost", rr.Scalars(self.session.cost()))
+            self._log("cost", rr.Scalars(self.smoother.cost()))
             self._show_map()
             self._seen.clear()
         self.updates += 1
@@ -95,7 +100,7 @@ class Live:
             self._log("camera", drawing.pinhole(camera), static=True)
 
     def _show_map(self) -> None:
-        values = self.session.values
+        values = self.smoother.values
         columns = {name: values.columns(name) for name in values.types()}
         poses = in_space(columns)
         if poses is not None:

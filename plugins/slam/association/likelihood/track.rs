@@ -31,8 +31,6 @@ pub(super) struct Track {
     pub last_seen_s: Option<f64>,
     /// Number of boxes at which it is compared with its neighbours again.
     pub next_merge_check: usize,
-    /// Number of boxes at which it is checked for a split again.
-    pub next_split_check: usize,
 }
 
 /// A box of an object.
@@ -63,8 +61,6 @@ pub(super) struct ExpectedBox<'a> {
 const MAX_OFFSET_SIGMA_OF_SIZE: f64 = 0.5;
 /// Boxes of an object at its first comparison with neighbours.
 const FIRST_MERGE_CHECK_BOXES: usize = 3;
-/// Boxes of an object at its first check for a split.
-const FIRST_SPLIT_CHECK_BOXES: usize = 8;
 /// Growth of the number of boxes until the next check.
 const CHECK_GROWTH: f64 = 1.3;
 
@@ -92,7 +88,6 @@ impl Track {
             boxes: vec![],
             last_seen_s: None,
             next_merge_check: FIRST_MERGE_CHECK_BOXES,
-            next_split_check: FIRST_SPLIT_CHECK_BOXES,
         }
     }
 
@@ -212,15 +207,6 @@ impl Track {
             self.next_merge_check = self.next();
             self.id
         })
-    }
-
-    /// Returns whether a check for a split is due, and schedules the next one.
-    pub(super) fn is_split_check_due(&mut self, frame: usize) -> bool {
-        let is_due = self.is_seen_in(frame) && self.boxes.len() >= self.next_split_check;
-        if is_due {
-            self.next_split_check = self.next();
-        }
-        is_due
     }
 
     fn is_seen_in(&self, frame: usize) -> bool {

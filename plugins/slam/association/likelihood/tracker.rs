@@ -99,8 +99,7 @@ impl Associator for Tracker {
         }
         let forgotten = self.forget_tentative_tracks(image.timestamp);
         self.pending_frames.push_back(PendingFrame::new(image, names));
-        let mut moved = self.reassociate_old_frames(image.timestamp, map);
-        moved.extend(self.split_objects(image.frame, map));
+        let moved = self.reassociate_old_frames(image.timestamp, map);
         Corrections { moved, merged: self.merge_objects(image.frame), forgotten }
     }
 

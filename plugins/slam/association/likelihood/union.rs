@@ -28,10 +28,10 @@ const DIFFERENT_CLASS_SIMILARITY: f64 = 0.1;
 const DIFFERENT_CLASS_FACTOR: f64 = 1.4;
 /// Similarity of classes above which the limit is multiplied by `SAME_CLASS_FACTOR`, if one object contains
 /// the centre of the other and both places are known well enough.
-pub(super) const SAME_CLASS_SIMILARITY: f64 = 0.5;
+const SAME_CLASS_SIMILARITY: f64 = 0.5;
 /// Multiplies `merge_error` for objects of one class in one place: no ellipsoid explains all boxes of a
 /// complex shape.
-pub(super) const SAME_CLASS_FACTOR: f64 = 2.0;
+const SAME_CLASS_FACTOR: f64 = 2.0;
 
 /// Objects per frame that are compared with their neighbours, at most.
 const MERGE_CHECKS_PER_FRAME: usize = 20;
@@ -150,7 +150,6 @@ fn try_merge(
     track.boxes.dedup_by_key(|seen| seen.frame());
     track.last_seen_s = more.last_seen_s.into_iter().chain(fewer.last_seen_s).reduce(f64::max);
     track.next_merge_check = track.next_merge_check.max(fewer.next_merge_check);
-    track.next_split_check = track.next_split_check.max(fewer.next_split_check);
     sightings.thin(&fitted.quadric.centroid());
     track.fitted = fit(&more.belief, fitted.quadric, sightings.all(), camera, &noise)?;
     track.sightings = sightings;
@@ -158,7 +157,7 @@ fn try_merge(
 }
 
 /// Returns the similarity of the class distributions, from 0 to 1 (Bhattacharyya coefficient).
-pub(super) fn class_similarity(one: &Track, two: &Track) -> f64 {
+fn class_similarity(one: &Track, two: &Track) -> f64 {
     one.votes.keys().map(|class| (one.class_share(class) * two.class_share(class)).sqrt()).sum()
 }
 

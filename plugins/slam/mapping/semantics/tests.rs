@@ -55,7 +55,7 @@ fn read(text: &str) -> Result<Vec<SemanticRule>, String> {
     let errors = Errors::new();
     let read = document.section(&errors).map(|mut section| {
         let (_, own) = manifactor_config::read_graph_section(&mut section);
-        read_semantics(section.take("semantics"), std::path::Path::new(""), &own, &errors)
+        read_semantics(section.optional_node("semantics"), std::path::Path::new(""), &own, &errors)
     });
     errors.finish(read).map_err(|e| e.to_string())
 }

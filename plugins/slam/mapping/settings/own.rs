@@ -18,7 +18,7 @@ impl OwnGraph {
     pub(super) fn read_section(section: &mut Section<'_>) -> Self {
         if !section.has("variables") && !section.has("factors") {
             // still registers both names, so that an error about a misspelt field can suggest them
-            let _ = (section.take("variables"), section.take("factors"));
+            let _ = (section.optional_node("variables"), section.optional_node("factors"));
             return Self::default();
         }
         let (graph, values) = read_graph_section(section);

@@ -12,7 +12,7 @@ use manifactor_mapping::mapping::{object_key, pose_key};
 use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::DualQuadric;
 use manifactor_recording::sequence::ObjectId;
-use manifactor_smoother::{FactorId, Session};
+use manifactor_smoother::{FactorId, Smoother};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Share of the boxes of an object that may change at once. Beyond it, the object is removed and initialized
@@ -25,7 +25,7 @@ pub(super) struct AssociationContext<'a> {
     /// Index and pose of the last frame.
     pub newest: (usize, Se3),
     pub live_poses: &'a [StampedPose],
-    pub smoother: &'a Session,
+    pub smoother: &'a Smoother,
     pub measurements: &'a Measurements,
 }
 

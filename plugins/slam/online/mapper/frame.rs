@@ -13,7 +13,7 @@ use manifactor_mapping::mapping::{
 use manifactor_mapping::semantics::RuleError;
 use manifactor_mapping::settings::RunSettings;
 use manifactor_recording::sequence::{Detection, Frame, ObjectId, Observation, UnusedDetection};
-use manifactor_smoother::{ChangeError, FactorId, Report};
+use manifactor_smoother::{ChangeError, FactorId, UpdateReport};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -59,7 +59,7 @@ pub struct FrameReport {
     pub refused: Vec<String>,
     /// Smoother reports: one for the frame with corrections of earlier frames, a second one if objects are
     /// added or removed.
-    pub updates: Vec<Report>,
+    pub updates: Vec<UpdateReport>,
 }
 
 /// The content of a frame after its pose is added.
@@ -112,7 +112,7 @@ impl FrameReport {
         prepend(before.removed, &mut self.removed);
         prepend(before.revised, &mut self.revised);
         prepend(before.refused, &mut self.refused);
-        let is_told = |update: &Report| {
+        let is_told = |update: &UpdateReport| {
             update.solved_batch || !(update.rejected.is_empty() && update.readmitted.is_empty())
         };
         prepend(before.updates.into_iter().filter(is_told).collect(), &mut self.updates);

@@ -7,7 +7,7 @@ use manifactor_mapping::mapping::{MappedObject, Rejection, Warning};
 use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::{DualQuadric, LandmarkError};
 use manifactor_recording::sequence::ObjectId;
-use manifactor_solve::{Diagnosis, Outcome, Rejected, Termination, Times};
+use manifactor_solve::{Diagnosis, Outcome, RejectedFactor, Termination, Times};
 use serde::Serialize;
 
 mod association;
@@ -141,7 +141,7 @@ pub struct SolveReport {
     pub inactive_share: f64,
     /// Factors that the solver rejected as outliers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub rejected: Vec<Rejected>,
+    pub rejected: Vec<RejectedFactor>,
     /// Worst-fitting factors, and the condition of the linear system.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagnosis: Option<Diagnosis>,

@@ -123,6 +123,6 @@ fn a_robot_finds_its_way_among_barcodes() {
     println!("{:?} ms", driven.latencies());
     assert!(ate.0 < 0.15 && of_newest.0 < 0.3 && ate.0 < 0.1 * of_odometry.0);
     assert!(known.len() == 15 && of_landmarks.1 < 0.4);
-    // the remaining gap scales with `Settings.bend`: at a tenth of its default, the gap is a tenth
+    // the remaining gap scales with `relinearization_threshold`: at a tenth of its default, the gap is a tenth
     assert!(driven.gaps.iter().all(|gap| *gap < 0.05) && driven.gaps.last().unwrap() < &0.02);
 }

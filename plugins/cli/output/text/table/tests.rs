@@ -4,7 +4,7 @@ fn run() -> Table {
     let header =
         ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "iterations", "time"];
     let mut table =
-        Table::of_numbers(&header).keeping(&["ATE (m)", "position (m)", "shape", "quality", "cost"]);
+        Table::of_numbers(&header).with_priority(&["ATE (m)", "position (m)", "shape", "quality", "cost"]);
     table.row(["before the solve", "0.02893", "0.04518", "0.5099", "0.5992", "18", "3280", "-", "-", "-"]);
     table.row([
         "QuadricSLAM",
