@@ -244,7 +244,7 @@ fn a_window_keeps_objects_and_lets_poses_go() {
 }
 
 #[test]
-fn boxes_that_cannot_be_taken_are_told_and_the_pose_is_taken() {
+fn rejected_boxes_are_reported_and_the_pose_is_accepted() {
     let (mut settings, sequence) = scene(DESK);
     settings.detections.cut_sides = CutSides::Keep;
     let mut mapper = add_all_frames(&settings, &sequence);
