@@ -6,7 +6,7 @@ use crate::output::text::{self, Table};
 use crate::status::Status;
 use clap::{Args, ValueEnum};
 use manifactor::config::Document;
-use manifactor::formats::detections::{self, Detection};
+use manifactor::formats::detections::{self, DetectionRow};
 use manifactor::formats::read_text;
 use manifactor::formats::tum::{self, Trajectory};
 use manifactor::graph::checked::Positive;
@@ -193,7 +193,7 @@ fn read_trajectory(path: &Path) -> Result<Trajectory, Failure> {
 }
 
 /// Reads a file that has to be a table of detections.
-fn read_detections(path: &Path) -> Result<Vec<Detection>, Failure> {
+fn read_detections(path: &Path) -> Result<Vec<DetectionRow>, Failure> {
     Ok(detections::parse(&read_as(path, kind::DETECTIONS)?, path)?)
 }
 

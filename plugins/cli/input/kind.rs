@@ -57,11 +57,11 @@ impl InputKind {
         let numbers = || first.split_whitespace().filter(|word| word.parse::<f64>().is_ok()).count();
         let has_column = |name| first.split(',').any(|column| column.trim() == name);
         match () {
-            () if GraphFormat::of_path(path).is_some() => Some(Self::GraphText),
+            () if GraphFormat::by_extension(path).is_some() => Some(Self::GraphText),
             () if is_frame(first) => Some(Self::Frames),
             () if has_column("timestamp") && has_column("xmin") => Some(Self::Detections),
             () if first.split_whitespace().count() == 8 && numbers() == 8 => Some(Self::Trajectory),
-            () if GraphFormat::of(path, text).is_some() => Some(Self::GraphText),
+            () if GraphFormat::detect(path, text).is_some() => Some(Self::GraphText),
             () => None,
         }
     }
