@@ -33,15 +33,6 @@ impl PendingFrame {
     pub(super) fn apply_merge(&mut self, ObjectMerge { from, into }: ObjectMerge) {
         self.names.iter_mut().filter(|name| **name == Some(from)).for_each(|name| *name = Some(into));
     }
-
-    /// Applies a move.
-    pub(super) fn apply_move(&mut self, moved: &DetectionMove) {
-        if self.frame == moved.frame
-            && let Ok(i) = self.indices.binary_search(&moved.index)
-        {
-            self.names[i] = Some(moved.into);
-        }
-    }
 }
 
 impl Tracker {

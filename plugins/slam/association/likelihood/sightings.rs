@@ -37,11 +37,6 @@ const NEW_LOG_DISTANCE: f64 = 0.1;
 const NEW_AFTER_FRAMES: usize = 30;
 
 impl Sightings {
-    /// Creates the set from sightings in the order of frames.
-    pub(super) fn from_sorted(all: Vec<Sighting>) -> Self {
-        Self(all)
-    }
-
     pub(super) fn all(&self) -> &[Sighting] {
         &self.0
     }
