@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn every_malformed_row_is_told_with_its_place() {
+    fn every_malformed_row_is_reported_with_its_place() {
         let text = errors("1,cup,0.5,1,2\n1,cup,x,1,2,3,4,1\n\n1,cup,1.5,1,2,3,4,1\n1,cup,1,4,2,3,4,1\n");
         assert_eq!(
             text,

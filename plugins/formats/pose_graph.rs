@@ -7,8 +7,8 @@
 //! - an `EQUIV a b` line declares that two poses are one place, as far as the edge between them says so (TORO
 //!   merges the two by that edge). The edge is already in the graph, so no factor is added. Without an edge,
 //!   a relative pose of zero with [`PoseGraphOptions::equivalence_sigma`] connects the two;
-//! - in each connected part without a `FIX` line, the first pose is held, unless [`PoseGraphOptions::anchor`] is
-//!   false.
+//! - in each connected part without a `FIX` line, the first pose is held, unless [`PoseGraphOptions::anchor`]
+//!   is false.
 use crate::error::{FormatError, Mistake, ProblemList};
 use crate::graph_format::{GraphFormat, GraphRead, ReadOptions};
 use crate::lines::lines;

@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn every_malformed_line_is_told_with_its_place() {
+    fn every_malformed_line_is_reported_with_its_place() {
         let text = "# t\n0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0\n2 0 0 nan 0 0 0 1\n3 0 0 0 0 0 1 1\n";
         assert_eq!(
             errors(text),
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_twenty_problems_are_told_and_the_rest_is_counted() {
+    fn the_first_twenty_problems_are_reported_and_the_rest_is_counted() {
         let text = errors(&"x\n".repeat(30));
         assert_eq!(text.lines().count(), 21);
         assert!(text.ends_with("\nand 10 more"));

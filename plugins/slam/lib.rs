@@ -1,8 +1,8 @@
 //! Object SLAM: from a camera's odometry and a detector's boxes to a map of objects.
 //!
 //! Each module is a crate of its own; this crate gathers them under one name. A
-//! [`RunDocument`](run_document::RunDocument) describes a run. A [`SequenceSource`](source::SequenceSource) gives a
-//! [`Sequence`](sequence::Sequence); a [`Mapping`](mapping::Mapping) makes a graph of it; a solver an
+//! [`RunDocument`](run_document::RunDocument) describes a run. A [`SequenceSource`](source::SequenceSource)
+//! gives a [`Sequence`](sequence::Sequence); a [`Mapping`](mapping::Mapping) makes a graph of it; a solver an
 //! [`Estimate`](estimate::Estimate), which is compared with the ground truth in a [`report`].
 pub use manifactor_association as association;
 pub use manifactor_experiment::{self as experiment, schema};

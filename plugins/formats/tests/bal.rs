@@ -84,7 +84,7 @@ fn the_first_pose_and_one_direction_of_the_farthest_are_held() {
 }
 
 #[test]
-fn what_nobody_observes_is_held_and_told() {
+fn what_nobody_observes_is_held_and_reported() {
     let text = TWO.replace("2 1 2", "2 2 2") + "5 5 5\n";
     let bundle = parse(&text);
     assert_eq!(bundle.report.unobserved, [Key::from("p1")]);
@@ -137,7 +137,7 @@ fn what_is_written_reads_back() {
 }
 
 #[test]
-fn what_bal_has_no_word_for_is_told() {
+fn what_bal_has_no_word_for_is_reported() {
     let (mut graph, mut values) = bundle(0.0);
     graph.factors_mut()[0].noise = Noise::sigma(2.0).unwrap();
     graph.factors_mut()[1].loss(Huber::default());

@@ -67,7 +67,7 @@ fn a_point_seen_by_a_turned_sensor_is_read_in_the_frame_of_the_pose() {
 }
 
 #[test]
-fn every_bad_line_is_told_with_what_was_expected() {
+fn every_bad_line_is_reported_with_what_was_expected() {
     let text = "VERTEX_SE2 0 0 0\nVERTEX_SE2 1 0 0 nan\nVERTEX_SE2 -1 0 0 0\nVERTEX_SE2 2 0 0 0\n\
                 VERTEX_SE2 2 0 0 0\nVERTEX_SE3:QUAT 3 0 0 0 0 0 0 2\nEDGE_SE2 2 2 0 0 0 1 0 0 1 0 1\n\
                 EDGE_SE2 2 4 0 0 0 1 0 0 -1 0 1\nEDGE_SE3:QUAT 2 5 0 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 \

@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn other_units_and_another_order_are_told_and_usual_ones_are_not() {
+    fn other_units_and_another_order_are_reported_and_usual_ones_are_not() {
         const NONE: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
         assert_eq!(doubts(NONE, 1.0, 1.0), "");
         assert_eq!(doubts([0.6, 0.0, 0.0, 0.8], 100.0, 1.0), "");

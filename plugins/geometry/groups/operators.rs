@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_are_told_in_metres_and_degrees() {
+    fn poses_are_reported_in_metres_and_degrees() {
         let turn = So3::exp(&vector![0.0, 0.0, FRAC_PI_2]);
         let text = Se3::new(turn, vector![1.0, 0.0, 0.5]).to_string();
         assert_eq!(text, "(1.000, 0.000, 0.500) m, 90.000° about (0.000, 0.000, 1.000)");

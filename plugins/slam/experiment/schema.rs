@@ -6,8 +6,8 @@ use manifactor_mapping::settings::RunSettings;
 use manifactor_mapping::settings::run_document::RunHeader;
 use serde_json::{Value, json};
 
-/// The schema of a [`RunDocument`](manifactor_mapping::settings::run_document::RunDocument), with everything registered that it can name; its
-/// definitions are put among the others.
+/// The schema of a [`RunDocument`](manifactor_mapping::settings::run_document::RunDocument), with everything
+/// registered that it can name; its definitions are put among the others.
 pub fn run_root(definitions: &mut Definitions) -> Value {
     let mut root = definitions.of::<RunSettings>();
     let mut header = definitions.of::<RunHeader>();

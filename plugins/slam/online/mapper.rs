@@ -169,15 +169,14 @@ impl Mapper {
         let frame = self.live_poses.len();
         let last = self.last.as_ref().map_or(0.0, |last| last.timestamp);
         let mut report = FrameReport::new(frame.saturating_sub(1), last);
-        let (live, session, measurements) = (&self.live_poses, &self.smoother, &self.measurements);
         let known = AssociationContext {
             newest: (frame, Se3::identity()),
-            live_poses: live,
-            smoother: session,
-            measurements,
+            live_poses: &self.live_poses,
+            smoother: &self.smoother,
+            measurements: &self.measurements,
         };
-        let learned = self.associator.finish_association(&known);
-        self.queue_corrections(learned, &mut report);
+        let corrections = self.associator.finish_association(&known);
+        self.queue_corrections(corrections, &mut report);
         if let Some(corrected) = self.apply_pending_corrections(&mut report) {
             match self.smoother.update() {
                 Ok(update) => {

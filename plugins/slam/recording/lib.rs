@@ -1,8 +1,8 @@
 //! The input of a run: frames with odometry, detections and ground truth, and the sources that read them.
 //!
-//! A [`SequenceSource`](source::SequenceSource) gives a [`Sequence`](sequence::Sequence), or its frames one by one as a
-//! [`FrameStream`](source::stream::FrameStream). A detection has a box, scores of classes, and further quantities, each a
-//! [`Measurement`](measurement::Measurement).
+//! A [`SequenceSource`](source::SequenceSource) gives a [`Sequence`](sequence::Sequence), or its frames one
+//! by one as a [`FrameStream`](source::stream::FrameStream). A detection has a box, scores of classes, and
+//! further quantities, each a [`Measurement`](measurement::Measurement).
 #[doc(hidden)]
 pub mod __private {
     pub use {inventory, serde_json};

@@ -201,7 +201,7 @@ mod tests {
     type DocumentEdit = fn(&mut serde_json::Value);
 
     #[test]
-    fn a_file_that_is_no_map_is_told_at_its_place() {
+    fn a_file_that_is_no_map_is_reported_at_its_place() {
         assert_eq!(error_of(|_| {}), "1 objects");
         let cases: [(&str, DocumentEdit); 8] = [
             ("a map of version 2, and this program reads version 1", |map| map["version"] = 2.into()),

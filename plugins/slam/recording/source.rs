@@ -229,7 +229,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_that_is_nowhere_is_told_with_the_places_tried() {
+    fn a_folder_that_is_nowhere_is_reported_with_the_places_tried() {
         let folders = InputFolders { data: None, document: "runs".into() };
         let text = folders.data_set(Path::new("fr1")).unwrap_err().to_string();
         assert!(text.contains("MANIFACTOR_DATA") && text.ends_with("runs/fr1"), "{text}");

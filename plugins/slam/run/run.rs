@@ -145,7 +145,8 @@ impl<'a> Run<'a> {
         Self { document, folders, loaded: vec![], journal: None, began: Instant::now(), reports: vec![] }
     }
 
-    /// Keeps the frames of a stream in a file, and begins with those that it has; see [`journal`](manifactor_recording::journal).
+    /// Keeps the frames of a stream in a file, and begins with those that it has; see
+    /// [`journal`](manifactor_recording::journal).
     pub fn journal_frames(&mut self, journal: PathBuf) {
         self.journal = Some(journal);
     }

@@ -175,8 +175,8 @@ impl Associator for WrongEverySecondFrame {
     }
 }
 
-/// Maps with `WrongEverySecondFrame` and checks that the final map equals the map with the right objects. Returns the
-/// largest number of objects on the way.
+/// Maps with `WrongEverySecondFrame` and checks that the final map equals the map with the right objects.
+/// Returns the largest number of objects on the way.
 fn corrections_now(merges: bool) -> usize {
     let (settings, sequence) = scene(&[]);
     let (given, twofold) =
@@ -234,7 +234,7 @@ fn boxes_that_turn_out_to_show_another_object_are_its_in_the_map() {
 }
 
 #[test]
-fn what_is_named_wrongly_in_a_crowd_is_mended_while_frames_come_and_when_no_other_comes() {
+fn what_is_associated_wrongly_in_a_crowd_is_mended_while_frames_come_and_when_no_other_comes() {
     let crowd =
         ["source.scene.classes=[\"bottle\"]", "source.scene.area=[1.2,1.2]", "source.trajectory.frames=250"];
     let (settings, sequence) = scene(&crowd);

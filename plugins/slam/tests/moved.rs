@@ -69,7 +69,7 @@ fn twice(more: &[&str]) -> RunSettings {
 }
 
 #[test]
-fn what_is_moved_within_a_stream_is_told_and_not_in_its_map() {
+fn what_is_moved_within_a_stream_is_reported_and_not_in_its_map() {
     for association in ["association.type=given", "association.type=likelihood"] {
         let settings = twice(&[MOVED, association]);
         let all = sequence(&settings);
@@ -96,7 +96,7 @@ fn what_is_moved_within_a_stream_is_told_and_not_in_its_map() {
 }
 
 #[test]
-fn what_stays_is_not_told() {
+fn what_stays_is_not_reported() {
     // nor are objects gone whose boxes are held out
     for more in [&[][..], &["evaluation.holdout.last=0.3"]] {
         let settings = twice(more);

@@ -178,7 +178,7 @@ fn a_rule_without_up_is_refused_at_the_first_frame() {
 }
 
 #[test]
-fn an_object_of_several_things_is_taken_out_again_and_does_not_come_back() {
+fn an_object_of_several_things_is_removed_again_and_does_not_come_back() {
     let (settings, mut sequence) = scene(DESK);
     let mut objects: Vec<ObjectId> = sequence.detections.iter().filter_map(|d| d.object).collect();
     objects.sort_unstable();
@@ -244,7 +244,7 @@ fn a_window_keeps_objects_and_lets_poses_go() {
 }
 
 #[test]
-fn boxes_that_cannot_be_taken_are_told_and_the_pose_is_taken() {
+fn rejected_boxes_are_reported_and_the_pose_is_accepted() {
     let (mut settings, sequence) = scene(DESK);
     settings.detections.cut_sides = CutSides::Keep;
     let mut mapper = add_all_frames(&settings, &sequence);
@@ -294,7 +294,7 @@ fn a_pose_that_cannot_be_taken_is_an_error_and_the_stream_goes_on() {
 }
 
 #[test]
-fn a_pose_that_overflows_leaves_nothing_behind_in_the_session() {
+fn a_pose_that_overflows_leaves_nothing_behind_in_the_smoother() {
     let (settings, sequence) = scene(DESK);
     let mut mapper = add_all_frames(&settings, &sequence);
     let mut frame = sequence.frames.last().unwrap().clone();

@@ -229,7 +229,7 @@ fn a_room_with_a_few_things_that_stand_as_in_the_map_is_not_taken_for_it() {
 }
 
 #[test]
-fn what_is_gone_is_told_and_what_is_new_is_added() {
+fn removed_objects_are_reported_and_new_ones_are_added() {
     let folder = tempfile::tempdir().unwrap();
     let known = |id: u32| {
         move |detection: &manifactor_slam::sequence::Detection| detection.object != Some(ObjectId(id))

@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_metric_is_told_at_its_place_with_those_that_exist() {
+    fn an_unknown_metric_is_reported_at_its_place_with_those_that_exist() {
         assert_eq!(wrong("metrics = ['ate_se3', 'gain_first_pose', 'position']"), "");
         let told = wrong("metrics = ['position', 'ate_se33']");
         assert!(

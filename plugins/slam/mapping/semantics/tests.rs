@@ -31,7 +31,7 @@ fn a_star_is_for_all() {
 }
 
 #[test]
-fn classes_that_match_nothing_are_told() {
+fn classes_that_match_nothing_are_reported() {
     let rules = table_one().unwrap();
     let seen = vec!["cup".to_owned(), "potted plant".to_owned()];
     let missing = unmatched(&rules[1], &seen, &ClassAliases::default());

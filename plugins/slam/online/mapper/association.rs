@@ -72,29 +72,29 @@ impl Mapper {
         &mut self,
         report: &mut FrameReport,
     ) -> Option<AppliedCorrections> {
-        let learned = std::mem::take(&mut self.pending);
-        if learned.is_empty() {
+        let pending = std::mem::take(&mut self.pending);
+        if pending.is_empty() {
             return None;
         }
         let before = self.take_snapshot();
         let measurements = self.measurements.clone();
-        let (mut names, mut owners) = (self.id_changes.clone(), vec![]);
-        for learned in &learned {
-            for moved in &learned.moved {
+        let (mut id_changes, mut owners) = (self.id_changes.clone(), vec![]);
+        for corrections in &pending {
+            for moved in &corrections.moved {
                 self.move_detection(moved);
-                names.record_move(moved);
+                id_changes.record_move(moved);
             }
-            report.moved.extend_from_slice(&learned.moved);
-            owners.extend(self.update_moved_boxes(&learned.moved, report));
-            for merge in &learned.merged {
+            report.moved.extend_from_slice(&corrections.moved);
+            owners.extend(self.update_moved_boxes(&corrections.moved, report));
+            for merge in &corrections.merged {
                 owners.extend(self.merge_objects(*merge, report));
-                names.record_merge(*merge);
+                id_changes.record_merge(*merge);
             }
-            learned.forgotten.iter().for_each(|id| self.forget_tentative_object(*id));
+            corrections.forgotten.iter().for_each(|id| self.forget_tentative_object(*id));
         }
-        let owners: BTreeSet<ObjectId> = owners.into_iter().map(|id| names.current_id(id)).collect();
+        let owners: BTreeSet<ObjectId> = owners.into_iter().map(|id| id_changes.current_id(id)).collect();
         self.apply_rules(&owners.into_iter().collect::<Vec<_>>(), report);
-        Some(AppliedCorrections { id_changes: names, corrections: learned, before, measurements })
+        Some(AppliedCorrections { id_changes, corrections: pending, before, measurements })
     }
 
     /// Restores the state before a failed correction. The correction is tried again with the next frame.

@@ -184,8 +184,12 @@ impl Mapper {
                 self.measurements.add_detection(detection, &self.camera, detections, aliases);
             }
             let newest = (report.frame, self.pose(report.frame).unwrap_or(report.pose));
-            let (live, session, measurements) = (&self.live_poses, &self.smoother, &self.measurements);
-            let known = AssociationContext { newest, live_poses: live, smoother: session, measurements };
+            let known = AssociationContext {
+                newest,
+                live_poses: &self.live_poses,
+                smoother: &self.smoother,
+                measurements: &self.measurements,
+            };
             seen.corrections = self.associator.learn_from_frame(&image, &report.box_objects, &known);
         } else {
             seen.boxes.clear();

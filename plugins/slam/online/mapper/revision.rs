@@ -66,13 +66,13 @@ impl Mapper {
     }
 
     /// Stores corrections to earlier frames, which are applied with the next frame.
-    pub(super) fn queue_corrections(&mut self, learned: Corrections, report: &mut FrameReport) {
-        report.forgotten.clone_from(&learned.forgotten);
-        if self.pending.is_empty() && learned.changes_no_object() {
-            learned.forgotten.iter().for_each(|id| self.forget_tentative_object(*id));
+    pub(super) fn queue_corrections(&mut self, corrections: Corrections, report: &mut FrameReport) {
+        report.forgotten.clone_from(&corrections.forgotten);
+        if self.pending.is_empty() && corrections.changes_no_object() {
+            corrections.forgotten.iter().for_each(|id| self.forget_tentative_object(*id));
         } else {
             // forgotten objects may have boxes that move
-            self.pending.push(learned);
+            self.pending.push(corrections);
         }
     }
 

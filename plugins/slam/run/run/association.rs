@@ -31,25 +31,25 @@ pub(super) fn associate_sequence(
         return Ok(AssociatedSequence { sequence, report: None });
     }
     let mut mapper = Mapper::new(sequence.header(), settings);
-    let (mut named, mut naming) = (Sequence::clone(&sequence), AssociationHistory::default());
+    let (mut named, mut history) = (Sequence::clone(&sequence), AssociationHistory::default());
     let mut taken = vec![];
     let mut interrupted = false;
     for observation in sequence.observations() {
         interrupted |= observer.poll().is_break();
         if interrupted {
-            naming.record_frame(&observation.detections, None);
+            history.record_frame(&observation.detections, None);
             taken.push(None);
             continue;
         }
         match mapper.add_frame(&observation) {
             Ok(report) => {
-                naming.record_frame(&observation.detections, Some(&report));
+                history.record_frame(&observation.detections, Some(&report));
                 report.refused.iter().for_each(|refused| tracing::warn!("{refused}"));
                 taken.push(Some(report.frame));
             }
             Err(error) => {
                 tracing::warn!("{error}");
-                naming.record_frame(&observation.detections, None);
+                history.record_frame(&observation.detections, None);
                 taken.push(None);
             }
         }
@@ -57,15 +57,15 @@ pub(super) fn associate_sequence(
     mapper.finish_association().refused.iter().for_each(|refused| tracing::warn!("{refused}"));
     for ((observation, boxes), frame) in with_boxes(&sequence).zip(&taken) {
         if let Some(frame) = *frame {
-            naming.replace_objects(boxes, mapper.id_changes(), |names| {
+            history.replace_objects(boxes, mapper.id_changes(), |names| {
                 mapper.reassociate(frame, &observation, names)
             });
         }
     }
-    for (detection, name) in named.detections.iter_mut().zip(naming.current_objects(mapper.id_changes())) {
+    for (detection, name) in named.detections.iter_mut().zip(history.current_objects(mapper.id_changes())) {
         detection.object = name;
     }
-    let report = naming.report(&*settings.association, mapper.id_changes());
+    let report = history.report(&*settings.association, mapper.id_changes());
     Ok(AssociatedSequence { sequence: Arc::new(named), report })
 }
 

@@ -76,11 +76,12 @@ pub fn online(
     progress.add_frame_report(&taken.mapper.finish_association());
     progress.add_final_counts(&mut taken.mapper);
     watch.on_end(&mut taken.mapper);
-    let StreamState { mapper, mut sequence, association: naming } = taken;
-    for (detection, name) in sequence.detections.iter_mut().zip(naming.current_objects(mapper.id_changes())) {
+    let StreamState { mapper, mut sequence, association: history } = taken;
+    for (detection, name) in sequence.detections.iter_mut().zip(history.current_objects(mapper.id_changes()))
+    {
         detection.object = name;
     }
-    let association = naming.report(&*settings.association, mapper.id_changes());
+    let association = history.report(&*settings.association, mapper.id_changes());
     let estimate = mapper.finish(Arc::new(sequence), observer)?;
     progress.compare_live_poses(&estimate, &settings.evaluation);
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);

@@ -23,8 +23,8 @@ const MIN_OBJECTS: usize = 4;
 /// Significance threshold in standard errors. It is high because the best of about twenty candidates is
 /// selected.
 const SIGNIFICANCE_SIGMAS: f64 = 2.0;
-/// A solve ends after this number of iterations, or at the relative decrease `MIN_RELATIVE_DECREASE` of the cost: scores
-/// differ by whole nats.
+/// A solve ends after this number of iterations, or at the relative decrease `MIN_RELATIVE_DECREASE` of the
+/// cost: scores differ by whole nats.
 const MAX_ITERATIONS: usize = 10;
 const MIN_RELATIVE_DECREASE: f64 = 1e-4;
 /// Cost of a box whose object is not visible from its pose, in nats.

@@ -191,7 +191,7 @@ fn one_pair_or_none_is_no_place() {
 }
 
 #[test]
-fn matches_are_within_reach_of_the_place_that_they_are_told_with() {
+fn matches_are_within_reach_of_the_position_that_is_reported_with_them() {
     // marks with larger errors than assumed, so that matches come and go
     let map = table(&["cup"], Some(Direction::Z));
     let mut looked_at = 0;
