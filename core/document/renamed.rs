@@ -16,7 +16,7 @@ pub struct RenamedField {
     pub new: &'static str,
 }
 
-/// Reads a table in which some fields may have their old names. `read` reads the table with the new names.
+/// Reads a table whose fields may have their old names. `read` reads the table with the new names.
 /// The first use of an old name logs a warning.
 ///
 /// # Errors
@@ -71,7 +71,7 @@ mod tests {
         width: f64,
     }
 
-    /// Reads a table in which each field is its name, with a value at the position after the name.
+    /// Reads a table of fields with their names, each with a value at the position after the name.
     fn read(fields: &[(&str, Value)]) -> Result<Sizes, ReadError> {
         let source = SourceText::new("sizes", "x".repeat(2 * fields.len()));
         let mut table = Table::default();
