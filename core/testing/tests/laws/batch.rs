@@ -1,4 +1,4 @@
-//! The terms of a batch in H and g equal those of the factor's own Jacobian, with noise and weights.
+//! The terms of a batch in H and g equal those of the factor's own Jacobian, whitened and weighted.
 use crate::dynamic::Chain;
 use crate::toy::{Area, SOUND, Spot, Spread};
 use manifactor_graph::batch::Member;
