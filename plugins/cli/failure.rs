@@ -223,9 +223,10 @@ fn help(diagnostic: &Diagnostic) -> Option<String> {
     match &diagnostic.fault {
         Fault::WrongType { expected, found } if expected == "an array" && found == "a table" => {
             // a header of TOML
-            let line = diagnostic.place.source.text().lines().nth(diagnostic.line().saturating_sub(1))?;
-            let (name, _) = line.trim_start().strip_prefix('[')?.split_once(']')?;
-            Some(format!("write `[[{name}]]`: each entry of the array is a table"))
+            let line = diagnostic.place.source.text().lines().nth(diagnostic.line().saturating_sub(1));
+            let header = line.and_then(|line| line.trim_start().strip_prefix('['));
+            let name = header.and_then(|header| header.split_once(']')).map(|(name, _)| name);
+            name.map(|name| format!("write `[[{name}]]`: each entry of the array is a table"))
         }
         Fault::UnknownField { known, .. } if is_axis(known) => Some(
             "an axis has `columns` and `rows`, or `name` and `options`; see `manifactor explain axes`"

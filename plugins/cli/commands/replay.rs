@@ -28,7 +28,7 @@ use std::time::Instant;
 /// the estimate of the previous pose. Fixed variables, and those that odometry does not reach, begin at the
 /// values in the file. At the end, the whole graph is solved as one batch.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  manifactor replay tests/fuzz/corpus/replay/plane.g2o --every 1 --gap")]
+#[command(after_help = "Example:\n  manifactor replay tests/fuzz/corpus/replay/plane.g2o")]
 pub(crate) struct Replay {
     /// The graph.
     graph: PathBuf,

@@ -39,8 +39,9 @@ impl InputKind {
         // a run may have variables and factors too
         match () {
             () if has("source") => Some(Self::Run),
-            () if has("axes") || has("base") => Some(Self::Experiment),
+            () if has("axes") => Some(Self::Experiment),
             () if has("variables") || has("factors") => Some(Self::Graph),
+            () if has("base") => Some(Self::Experiment),
             () if has("variants") => Some(Self::Run),
             () if has("semantics") => Some(Self::Rules),
             () => None,
@@ -194,7 +195,7 @@ impl Expected {
             Some(kind) => kind.refused(path, self.name),
             None => {
                 let message = format!("{} is a folder; expected {}", path.display(), self.name);
-                Failure::with_help(message, "give a file")
+                Failure::NotThere { message, help: Some("give a file".to_owned()) }
             }
         })
     }

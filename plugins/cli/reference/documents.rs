@@ -81,14 +81,14 @@ columns = { seed = "source.seed" }
 rows = [1, 2, 3]
 
 [[axes]]
-name = "loss"
+name = "views"
 options = [
-    { name = "none" },
-    { name = "cauchy", set = { detections = { loss = { type = "cauchy", scale = 2.8 } } } },
+    { name = "few", set = { objects = { min_views = 2 } } },
+    { name = "many", set = { objects = { min_views = 5 } } },
 ]
 
 [summary]
-by = ["loss"]
+by = ["views"]
 metrics = ["position", "shape"]"#,
         root: experiment_root,
     },

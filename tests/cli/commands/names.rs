@@ -40,8 +40,10 @@ fn documents_and_their_tables_are_explained() {
         ("summary.baseline", ["a field of the document experiment", "compared", "Type:", "Default"]),
     ] {
         let text = manifactor(&format!("explain {name}")).ended(0).stdout;
+        // paragraphs are wrapped
+        let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
         for part in parts {
-            assert!(text.contains(part), "{name}: {part} is missing:\n{text}");
+            assert!(words(&text).contains(&words(part)), "{name}: {part} is missing:\n{text}");
         }
     }
     let json = manifactor("explain axes --json").ended(0).json();
@@ -81,7 +83,7 @@ fn every_name_is_explained() {
 #[test]
 fn an_explanation_has_fields_with_their_defaults() {
     let text = manifactor("explain levenberg_marquardt").ended(0).stdout;
-    for part in ["initial_lambda", "stop.max_iterations", "100", "Most linearizations"] {
+    for part in ["initial_lambda", "stop.max_iterations", "100", "linearizations"] {
         assert!(text.contains(part), "{part} is missing:\n{text}");
     }
     let text = manifactor("explain vertical_orientation").ended(0).stdout;

@@ -80,5 +80,5 @@ fn completions_and_the_manual_know_every_command() {
     let page = manifactor("man").ended(0).stdout;
     assert!(page.starts_with(".ie") && page.contains("check\\-factor"), "{page}");
     assert!(manifactor("man plot").ended(0).stdout.contains("record.json"));
-    manifactor("man plto").ended(2).complains("there is no command");
+    manifactor("man plto").ended(2).complains("unknown command `plto`");
 }

@@ -118,6 +118,6 @@ fn a_folder_is_refused_with_the_command_for_it() {
     ran.complains("`manifactor run RUN.toml --out FOLDER`");
     manifactor(&format!("plot {}", path(&folder, "nowhere"))).ended(3).complains("there is no such folder");
     manifactor(&format!("run {}", path(&folder, "empty")))
-        .ended(2)
+        .ended(3)
         .complains("empty is a folder; expected the document");
 }
