@@ -29,6 +29,7 @@ use nalgebra::{Vector2, Vector3};
 use std::error::Error;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 type Fallible<T> = Result<T, Box<dyn Error>>;
 /// Draws one figure, and returns its SVG.
@@ -153,9 +154,21 @@ fn class(object: &Measured) -> String {
     object.class_name().unwrap_or("unknown").to_owned()
 }
 
-/// Maps the frames of `growing.toml` one by one. Returns the moving picture, the record of the batch solve after
-/// the last frame, and the seconds of each frame.
-fn grown() -> Fallible<(Movie, VariantRecord, Vec<f64>)> {
+/// A map that has grown frame by frame.
+struct Grown {
+    movie: Movie,
+    /// Record of the batch solve after the last frame.
+    record: VariantRecord,
+    /// Time of each frame. Unit: seconds.
+    seconds: Vec<f64>,
+}
+
+/// Maps the frames of `growing.toml` one by one, once for all figures.
+fn grown() -> Fallible<&'static Grown> {
+    static GROWN: OnceLock<Grown> = OnceLock::new();
+    if let Some(grown) = GROWN.get() {
+        return Ok(grown);
+    }
     let document = RunDocument::read(&document("growing.toml")?)?;
     let variant = document.variants.first().ok_or("the document has no variant")?;
     let mut snapshots = Snapshots { movie: None, seen: 0 };
@@ -163,20 +176,21 @@ fn grown() -> Fallible<(Movie, VariantRecord, Vec<f64>)> {
     let (estimate, report) = run.variant_online(variant, &mut snapshots, &mut Silent)?;
     let seconds = report.online.map(|online| online.seconds).unwrap_or_default();
     let movie = snapshots.movie.ok_or("no frame was mapped")?;
-    Ok((movie, VariantRecord::new(variant, &estimate), seconds))
+    let record = VariantRecord::new(variant, &estimate);
+    Ok(GROWN.get_or_init(|| Grown { movie, record, seconds }))
 }
 
 fn growing() -> Fallible<String> {
-    Ok(grown()?.0.svg(800.0, 6.0, Theme::Light).ok_or("there is nothing to draw")?)
+    Ok(grown()?.movie.svg(800.0, 6.0, Theme::Light).ok_or("there is nothing to draw")?)
 }
 
 fn association() -> Fallible<String> {
     let text = "Data association over time: the frames in which each object is detected";
-    svg(figures::association(&grown()?.1, text, WIDTH))
+    svg(figures::association(&grown()?.record, text, WIDTH))
 }
 
 fn latency() -> Fallible<String> {
-    svg(latencies("Latency of the smoother: time of each frame", &grown()?.2, WIDTH))
+    svg(latencies("Latency of the smoother: time of each frame", &grown()?.seconds, WIDTH))
 }
 
 /// Number of poses on a side of the square that the simulated robot drives around, and number of rounds.
