@@ -18,9 +18,12 @@ pub fn ellipsoid_and_box(width: f64) -> Option<Picture> {
     let turn = So3::exp(&Vector3::new(0.5, 0.1, 0.7));
     let pose = Se3 { rotation: turn, translation: Vector3::new(0.1, 0.05, 0.25) };
     let quadric = DualQuadric { pose, semi_axes: Vector3::new(0.4, 0.16, 0.22) };
-    let eye = looking_at(&Vector3::new(-0.5, -1.4, 0.85), &quadric.pose.translation);
-    let measured = BoundingBox::new([165.0, 128.0, 470.0, 356.0]).ok()?;
-    let seen = SeenBox::new(ObjectId(0), measured, Some((&eye, &quadric)), &camera);
+    let eye = looking_at(&Vector3::new(-0.3, -0.85, 0.7), &quadric.pose.translation);
+    let whole = BoundingBox::new([0.0, 0.0, 640.0, 480.0]).ok()?;
+    let seen = SeenBox::new(ObjectId(0), whole, Some((&eye, &quadric)), &camera);
+    let [xmin, ymin, xmax, ymax] = seen.projected?;
+    // a detection with an error of some pixels
+    let measured = [xmin - 14.0, ymin + 9.0, xmax + 8.0, ymax + 16.0];
     let (half, height) = (0.5 * width, 0.4 * width);
     let text = "The box of an ellipsoid: the bounds of its outline in the image";
     let mut sheet = Sheet::new(width, HEAD + height + 34.0);
@@ -72,7 +75,7 @@ pub fn ellipsoid_and_box(width: f64) -> Option<Picture> {
     let outline = outline.iter().map(|p| at([p.x, p.y])).collect();
     sheet.outline(outline, Stroke::solid(Ink::Class(0), 2.0), Some((Ink::Class(0), 0.25)));
     sheet.outline(rectangle(seen.projected?), Stroke::solid(Ink::Class(0), 1.4), None);
-    sheet.outline(rectangle(measured.bounds()), Stroke::dashed(Ink::Odometry, 1.8), None);
+    sheet.outline(rectangle(measured), Stroke::dashed(Ink::Odometry, 1.8), None);
     for [dx, dy] in touches {
         sheet.dot(at([x + dx, y + dy]), 3.0, Ink::Text);
     }

@@ -48,7 +48,7 @@ fn differences(summary: &Summary, metric: &str, width: f64) -> Option<Picture> {
     };
     let intervals = Intervals {
         title: format!("{metric}: difference from the baseline"),
-        x: "difference (% of the mean of the baseline), 95 % interval".to_owned(),
+        x: "difference (% of the baseline)".to_owned(),
         are_differences: true,
         means: summary.groups.iter().filter_map(mean).collect(),
     };
