@@ -11,6 +11,7 @@
 mod architecture;
 mod catalogue;
 mod expression;
+mod figures;
 #[path = "fuzz/replay.rs"]
 mod fuzz;
 mod numbers;

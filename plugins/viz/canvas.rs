@@ -16,6 +16,19 @@ pub(crate) struct Sheet {
     pub(crate) width: f64,
     pub(crate) height: f64,
     pub(crate) items: Vec<Item>,
+    /// Axis of time, for the cursor that all charts of a page share.
+    pub(crate) time: Option<TimeAxis>,
+}
+
+/// A horizontal axis of time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct TimeAxis {
+    /// First and last position on the sheet. Unit: pixels.
+    pub(crate) x: [f64; 2],
+    /// Times at these positions. Unit: seconds.
+    pub(crate) seconds: [f64; 2],
+    /// Top and bottom of the charts. Unit: pixels.
+    pub(crate) y: [f64; 2],
 }
 
 /// One element of a sheet; later ones cover earlier ones.
@@ -89,7 +102,7 @@ impl Text {
 
 impl Sheet {
     pub(crate) fn new(width: f64, height: f64) -> Self {
-        Self { width, height, items: vec![] }
+        Self { width, height, items: vec![], time: None }
     }
 
     pub(crate) fn text(&mut self, text: Text) {

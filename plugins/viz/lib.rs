@@ -4,6 +4,7 @@
 //! Everything is drawn from the [record](manifactor_slam::record) of a run, so it can be drawn again.
 mod canvas;
 mod drawing;
+pub mod figures;
 mod latencies;
 mod pages;
 mod ply;

@@ -5,6 +5,7 @@ mod live_page;
 mod page;
 mod run_page;
 mod run_tables;
+mod verdict;
 mod viewer;
 
 pub use experiment_page::{experiment_page, experiment_pictures};

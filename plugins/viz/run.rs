@@ -46,16 +46,20 @@ pub(crate) fn images(variant: &VariantRecord, palette: &Palette, width: f64) -> 
         .collect()
 }
 
-/// Draws the cost by iteration, with a curve for each variant.
+/// Draws the cost by iteration, with a curve for each variant. Several variants may have different factors, so
+/// their costs are shares of the initial cost.
 pub(crate) fn cost(variants: &[VariantRecord], width: f64) -> Option<Picture> {
+    let is_shared = variants.len() > 1;
     let curve = |(i, variant): (usize, &VariantRecord)| {
-        let points = variant.cost.iter().enumerate().map(|(step, cost)| (step as f64, *cost)).collect();
+        let unit = variant.cost.first().copied().filter(|cost| is_shared && *cost > 0.0).unwrap_or(1.0);
+        let points = variant.cost.iter().enumerate().map(|(step, cost)| (step as f64, cost / unit)).collect();
         Curve::new(&variant.name, Ink::Series(i), points).with_dots()
     };
     let curves: Vec<Curve> = variants.iter().enumerate().map(curve).collect();
     let costs = || curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
     let log_y = costs().fold(0.0, f64::max) > 10.0 * costs().fold(f64::INFINITY, f64::min);
-    let panel = Chart { y: "cost, ½ Σ ρ".into(), log_y, begun_at_zero: false, curves };
+    let y = if is_shared { "cost / initial cost" } else { "cost, ½ Σ ρ" };
+    let panel = Chart { y: y.into(), log_y, begun_at_zero: false, curves };
     let text = "cost by accepted step";
     let sheet = figure(text, "accepted steps", false, &[panel], width, 0.5 * width)?;
     Some(Picture::new("cost", text, sheet))
@@ -66,5 +70,3 @@ fn clock(variant: &VariantRecord) -> impl Fn(f64) -> f64 {
     let start = variant.frames.first().map_or(0.0, |frame| frame.timestamp);
     move |timestamp| timestamp - start
 }
-
-const TIME: &str = "time (s)";

@@ -17,6 +17,10 @@ pub(crate) enum Ink {
     Odometry,
     /// The estimated trajectory.
     Estimate,
+    /// Links of a page.
+    Link,
+    /// Warnings of a page.
+    Warning,
     /// Outliers.
     Outlier,
     /// A class of objects, by its index among all classes.
@@ -48,12 +52,14 @@ const SERIES: [&str; 8] =
 
 /// The inks that depend on the theme, with their names in style sheets and their colours on light and on
 /// dark.
-const THEMED: [(Ink, &str, [&str; 2]); 5] = [
+const THEMED: [(Ink, &str, [&str; 2]); 7] = [
     (Ink::Paper, "paper", ["#ffffff", "#14171c"]),
     (Ink::Text, "text", ["#1d2129", "#e6e9ee"]),
     (Ink::Faint, "faint", ["#5a6472", "#a3adba"]),
     (Ink::Grid, "grid", ["#e3e6ea", "#2c323b"]),
     (Ink::Truth, "truth", ["#1d2129", "#e6e9ee"]),
+    (Ink::Link, "link", ["#1766b3", "#6fb4f5"]),
+    (Ink::Warning, "warning", ["#9c4a0c", "#e79a5b"]),
 ];
 
 impl Ink {

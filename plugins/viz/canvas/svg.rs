@@ -29,14 +29,26 @@ impl Sheet {
     /// Returns an SVG document, or a part of a page. Screen readers read `title` instead of the picture.
     pub(crate) fn svg(&self, title: &str, colors: Colors) -> String {
         let (width, height) = (number(self.width), number(self.height));
+        let time = self.time.filter(|_| colors == Colors::OfPage).map(|time| {
+            let numbers = [time.x, time.seconds, time.y].concat();
+            let numbers: Vec<String> = numbers.into_iter().map(|x| format!("{x:.3}")).collect();
+            format!("data-time=\"{}\" ", numbers.join(" "))
+        });
+        let time = time.unwrap_or_default();
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
-             role=\"img\" font-family=\"{FONT}\" stroke-linejoin=\"round\" stroke-linecap=\"butt\">\n<title>{}</title>\n",
+             {time}role=\"img\" font-family=\"{FONT}\" stroke-linejoin=\"round\" stroke-linecap=\"butt\">\n<title>{}</title>\n",
             escape(title)
         );
         if let Colors::Of(_) = colors {
             svg += &format!("<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>\n", colors.of(Ink::Paper));
         }
+        svg + &self.parts(colors) + "</svg>\n"
+    }
+
+    /// Returns the elements of the sheet, without the document around them.
+    pub(crate) fn parts(&self, colors: Colors) -> String {
+        let mut svg = String::new();
         for item in self.drawable() {
             match item {
                 Item::Path { points, closed, stroke, fill } => {
@@ -54,7 +66,7 @@ impl Sheet {
                 Item::Text(text) => words(&mut svg, &text, colors),
             }
         }
-        svg + "</svg>\n"
+        svg
     }
 }
 

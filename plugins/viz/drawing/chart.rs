@@ -3,7 +3,10 @@ use super::axes::{Axes, HEAD, title};
 use super::legend::{Entry, legend};
 use super::scale::Scale;
 use super::series::stretches;
-use crate::canvas::{Ink, Sheet, Stroke};
+use crate::canvas::{Ink, Sheet, Stroke, TimeAxis};
+
+/// Label of an axis of time since the first frame.
+pub(crate) const TIME: &str = "time (s)";
 
 /// A panel of curves.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -85,6 +88,11 @@ pub(crate) fn figure(
     title(&mut sheet, text);
     sheet.place(entries, [10.0, HEAD]);
     let last = panels.len() - 1;
+    if x == TIME && !log_x {
+        let (from, to) = along.ends();
+        let bottom = top + each * panels.len() as f64 - 22.0;
+        sheet.time = Some(TimeAxis { x: [10.0 + left, width - 18.0], seconds: [from, to], y: [top, bottom] });
+    }
     for (i, (panel, y)) in panels.iter().zip(scales).enumerate() {
         let ymin = top + i as f64 * each;
         let x_label = if i == last { x.to_owned() } else { String::new() };
@@ -154,6 +162,23 @@ mod tests {
         assert!(!svg.contains("NaN") && !svg.contains("nothing"));
         assert_eq!(sheet.png(Theme::Dark).unwrap().get(..4), Some(&b"\x89PNG"[..]));
         assert!(figure("", "", false, &[Chart::default()], 700.0, 400.0).is_none());
+    }
+
+    #[test]
+    fn charts_over_time_tell_a_page_where_their_axis_is() {
+        let chart = |x: &str, colors| {
+            let curves = vec![Curve::new("c", Ink::Series(0), vec![(0.0, 1.0), (8.0, 2.0)])];
+            let panel = Chart { curves, ..Chart::default() };
+            figure("", x, false, &[panel], 700.0, 400.0).unwrap().svg("", colors)
+        };
+        let svg = chart(TIME, Colors::OfPage);
+        let (_, rest) = svg.split_once("data-time=\"").unwrap();
+        let numbers: Vec<f64> =
+            rest.split('"').next().unwrap().split(' ').map(|x| x.parse().unwrap()).collect();
+        assert_eq!(numbers[2..4], [0.0, 8.0]);
+        assert!(numbers[0] < numbers[1] && numbers[4] < numbers[5], "{numbers:?}");
+        assert!(!chart("steps", Colors::OfPage).contains("data-time"));
+        assert!(!chart(TIME, Colors::Of(Theme::Light)).contains("data-time"));
     }
 
     #[test]

@@ -26,23 +26,29 @@ struct FiveNumbers {
 const ROW: f64 = 30.0;
 const ROWS: usize = 400;
 const DOTS: usize = 60;
+/// Largest number of values that are drawn as dots.
+const FEW: usize = 5;
+
+/// A group: its name, its five numbers, and its values.
+type Group<'a> = (&'a String, FiveNumbers, &'a Vec<f64>);
 
 impl Distribution {
-    /// Draws a box plot for each group: the box spans the quartiles and shows the median; the whiskers end
+    /// Draws the values of a group of at most five as dots, and a box plot for each larger group: the box spans the quartiles and shows the median; the whiskers end
     /// at the last value within 1.5 times the box's width. Values beyond the whiskers are dots; values off
     /// the scale are counted at an arrow. Non-finite values are omitted. Returns `None` if nothing is left.
     pub(crate) fn sheet(&self, width: f64) -> Option<Sheet> {
-        let groups = self.groups.iter().filter_map(|(name, values)| Some((name, FiveNumbers::of(values)?)));
-        let mut groups: Vec<(&String, FiveNumbers)> = groups.collect();
+        let groups =
+            self.groups.iter().filter_map(|(name, values)| Some((name, FiveNumbers::of(values)?, values)));
+        let mut groups: Vec<Group<'_>> = groups.collect();
         let left_out = groups.len().saturating_sub(ROWS);
         groups.truncate(ROWS);
-        let ends = groups.iter().flat_map(|(_, five)| five.whiskers);
+        let ends = groups.iter().flat_map(|(_, five, _)| five.whiskers);
         let within = Scale::over(ends, false)?.with_margin(1.0);
-        let shown = |(_, five): &(&String, FiveNumbers)| -> Vec<f64> {
+        let shown = |(_, five, _): &Group<'_>| -> Vec<f64> {
             five.beyond.iter().copied().filter(|x| within.holds(*x)).chain(five.whiskers).collect()
         };
         let x = Scale::over(groups.iter().flat_map(shown), false)?.with_margin(0.04);
-        let widest = groups.iter().map(|(name, _)| text_width(name, NUMBERS, false)).fold(0.0, f64::max);
+        let widest = groups.iter().map(|(name, ..)| text_width(name, NUMBERS, false)).fold(0.0, f64::max);
         let left = (widest + 18.0).min(0.4 * width);
         let height = HEAD + 6.0 + ROW * groups.len() as f64 + 40.0;
         let mut sheet = Sheet::new(width, height);
@@ -55,11 +61,14 @@ impl Distribution {
         let rows = Scale::new(0.0, groups.len() as f64);
         let axes = Axes { area, x, y: rows, x_label: String::new(), y_label: String::new() };
         grid(&axes, &mut sheet, &self.x);
-        for (row, (name, five)) in groups.iter().enumerate() {
+        for (row, (name, five, values)) in groups.iter().enumerate() {
             let y = area[1] + (row as f64 + 0.5) * ROW;
             let name = fitted(name, NUMBERS, left - 16.0);
             sheet.text(Text::new(name, [left - 8.0, y + 4.0], NUMBERS, Ink::Text).anchored(Anchor::End));
-            five.draw(&axes, y, &mut sheet);
+            match values.len() {
+                0..=FEW => FiveNumbers::draw_dots(values, &axes, y, &mut sheet),
+                _ => five.draw(&axes, y, &mut sheet),
+            }
         }
         Some(sheet)
     }
@@ -102,6 +111,13 @@ impl FiveNumbers {
         ];
         let beyond = sorted.iter().copied().filter(|x| *x < whiskers[0] || *x > whiskers[1]).collect();
         Some(Self { whiskers, quartiles, beyond })
+    }
+
+    /// Draws the values themselves as dots: a box plot of a few values would hide how few there are.
+    fn draw_dots(values: &[f64], axes: &Axes, y: f64, sheet: &mut Sheet) {
+        for value in values.iter().filter(|value| value.is_finite() && axes.x.holds(**value)) {
+            sheet.dot([axes.point(*value, 0.0)[0], y], 3.0, Ink::Series(0));
+        }
     }
 
     fn draw(&self, axes: &Axes, y: f64, sheet: &mut Sheet) {

@@ -77,6 +77,7 @@ pub(crate) fn map(scene: &Scene, view: Viewpoint, palette: &Palette, width: f64)
     let (name, seen) = match view {
         Viewpoint::Top => ("map_top", "seen from above"),
         Viewpoint::Side => ("map_side", "seen from the side"),
+        Viewpoint::Oblique => ("map_oblique", "seen from above at an angle"),
     };
     Picture::new(name, format!("{text}: trajectories and objects {seen}"), sheet)
 }

@@ -28,6 +28,10 @@ impl Picture {
         Self { name, title: title.into(), sheet }
     }
 
+    pub(crate) fn sheet(&self) -> &Sheet {
+        &self.sheet
+    }
+
     /// Returns the picture as SVG.
     pub fn svg(&self, theme: Theme) -> String {
         self.sheet.svg(&self.title, Colors::Of(theme))

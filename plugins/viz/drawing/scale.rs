@@ -48,6 +48,11 @@ impl Scale {
         Self { low: low - room, high: high + room, log }
     }
 
+    /// Returns the first and the last value.
+    pub(crate) fn ends(&self) -> (f64, f64) {
+        (self.low, self.high)
+    }
+
     /// Adds a share of the range above, and also below unless the axis begins at zero.
     pub(crate) fn with_margin(self, share: f64) -> Self {
         let Self { low, high, log } = self;

@@ -108,7 +108,8 @@ fn is_finite(position: &Vector3<f64>) -> bool {
     position.iter().all(|x| x.is_finite())
 }
 
-fn ellipsoid(quadric: &DualQuadric) -> Shape {
+/// Returns the shape of an estimate.
+pub(crate) fn ellipsoid(quadric: &DualQuadric) -> Shape {
     let axes = quadric.pose.rotation.matrix() * Matrix3::from_diagonal(&quadric.semi_axes);
     Shape { centroid: quadric.pose.translation, axes }
 }

@@ -9,7 +9,12 @@ pub(crate) enum Viewpoint {
     Top,
     /// From the side, with up at the top.
     Side,
+    /// From above at an angle.
+    Oblique,
 }
+
+/// Elevation of the oblique view. Unit: radians.
+const ELEVATION: f64 = 0.6;
 
 /// Largest absolute coordinate. Its square is finite, so outlines and margins are finite too.
 const FAR: f64 = 1e150;
@@ -37,6 +42,10 @@ impl Viewpoint {
         let ahead = up.cross(&right);
         match self {
             Viewpoint::Top => Plane { right, upward: ahead, labels: [name(&right), name(&ahead)] },
+            Viewpoint::Oblique => {
+                let upward = ahead * ELEVATION.sin() + up * ELEVATION.cos();
+                Plane { right, upward, labels: [name(&right), "upward"] }
+            }
             Viewpoint::Side => Plane { right, upward: up, labels: [name(&right), "up"] },
         }
     }
@@ -81,7 +90,7 @@ mod tests {
     fn any_up_gives_a_right_angle() {
         for up in [[1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1e-12], [-1.0, 0.3, 0.0]] {
             let up = Direction::new(up.into()).unwrap();
-            for view in [Viewpoint::Top, Viewpoint::Side] {
+            for view in [Viewpoint::Top, Viewpoint::Side, Viewpoint::Oblique] {
                 let plane = view.plane(&up);
                 assert!(plane.right.dot(&plane.upward).abs() < 1e-12);
                 assert!(

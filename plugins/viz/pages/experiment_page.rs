@@ -1,12 +1,13 @@
 //! The page of an experiment: means, comparisons, distributions, curves, and every trial.
 use crate::canvas::Ink;
-use crate::drawing::{Chart, Curve, Distribution, Picture, figure};
+use crate::drawing::{Chart, Curve, Distribution, Intervals, Mean, Picture, figure};
 use crate::pages::page::Page;
 use crate::pages::run_page::{WIDTH, version};
 use manifactor_formats::table::{Column, Table};
 use manifactor_slam::experiment::{Experiment, ExperimentSummary};
 
-/// Draws one picture for each metric of an experiment: curves over the column that the summary names, or
+/// Draws the pictures of an experiment. Each metric has a picture of its differences from the baseline, if
+/// there is one. It also has curves over the column that the summary names, or
 /// distributions. Unit of `width`: pixels.
 pub fn experiment_pictures(
     experiment: &Experiment,
@@ -28,7 +29,31 @@ pub fn experiment_pictures(
             Some(Picture::new(metric, format!("how {metric} is distributed over trials"), sheet))
         }
     };
-    summary.metrics.iter().filter_map(picture).collect()
+    let differences = summary.metrics.iter().filter_map(|metric| differences(summary, metric, width));
+    differences.chain(summary.metrics.iter().filter_map(picture)).collect()
+}
+
+/// Draws the mean differences of a metric from the baseline, with their confidence intervals.
+fn differences(summary: &Summary, metric: &str, width: f64) -> Option<Picture> {
+    let mean = |group: &manifactor_slam::experiment::Group| {
+        let comparison = group.comparisons.get(metric)?;
+        let percent = 100.0 / comparison.baseline.abs();
+        let difference = comparison.difference;
+        let interval = difference.low.zip(difference.high);
+        Some(Mean {
+            name: group.labels.join(", "),
+            mean: percent * difference.mean,
+            interval: interval.map(|(low, high)| [percent * low, percent * high]),
+        })
+    };
+    let intervals = Intervals {
+        title: format!("{metric}: difference from the baseline"),
+        x: "difference (% of the baseline)".to_owned(),
+        are_differences: true,
+        means: summary.groups.iter().filter_map(mean).collect(),
+    };
+    let text = format!("{metric}: mean differences from the baseline with 95 % intervals");
+    Some(Picture::new(&format!("{metric}_differences"), text, intervals.sheet(width)?))
 }
 
 /// Largest number of trials in the page.
@@ -44,24 +69,33 @@ pub fn experiment_page(
     let mut page = Page::new(&experiment.title);
     let done = experiment.trials.len() - summary.open;
     page.paragraph(&format!("{done} of {} trials. {}", experiment.trials.len(), version()));
+    page.contents();
     page.heading("Summary");
-    page.table(&summary.header(), &summary.rows().collect::<Vec<_>>());
+    page.cards(&summary.header(), &summary.rows().collect::<Vec<_>>());
     page.paragraph(
-        "Means over trials; in brackets the difference from the baseline over pairs of trials, with the bootstrap's 95 % \
-         interval, as a share of the baseline's mean.",
+        "Means over trials. In brackets: the mean difference from the baseline over pairs of trials, as a share of the mean of the \
+         baseline, with the 95 % interval of a bootstrap.",
     );
-    match &experiment.summary.curve {
-        Some(x) => page.heading(&format!("Over {x}")),
-        None => page.heading("Distributions"),
-    };
+    let pictures = experiment_pictures(experiment, summary, trials, WIDTH);
+    let (differences, others): (Vec<&Picture>, Vec<&Picture>) =
+        pictures.iter().partition(|picture| picture.name.ends_with("_differences"));
+    if !differences.is_empty() {
+        page.heading("Differences");
+        let caption = "Differences from the baseline. Grey: the interval contains zero, so these trials do not show a difference.";
+        page.pictures(differences.into_iter().map(|picture| (picture, caption.to_owned())));
+    }
     let caption = match &experiment.summary.curve {
-        Some(_) => "Means over trials.",
+        Some(x) => {
+            page.heading(&format!("Over {x}"));
+            "Means over trials."
+        }
         None => {
-            "Over trials: boxes reach from quartile to quartile, whiskers to the last value within one and a half times that."
+            page.heading("Distributions");
+            "Over trials: boxes span the quartiles, and whiskers end at the last value within one and a half times that span. A group \
+             of at most five trials has a dot for each."
         }
     };
-    let pictures = experiment_pictures(experiment, summary, trials, WIDTH);
-    page.pictures(pictures.iter().map(|picture| (picture, caption.to_owned())));
+    page.pictures(others.into_iter().map(|picture| (picture, caption.to_owned())));
     page.heading("Trials");
     let rows = trials.rows().unwrap_or_default();
     if rows > TRIALS {

@@ -7,7 +7,7 @@ mod tests;
 use super::viewer::{bounds, number, of_box, of_frame, of_object, of_scenes, scene};
 use crate::canvas::Ink;
 use manifactor_formats::replay::Latencies;
-use manifactor_graph::Direction;
+use manifactor_graph::{Direction, Key};
 use manifactor_quadric::{BoundingBox, Camera, DualQuadric};
 use manifactor_slam::estimate::{Estimate, LandmarkEstimate};
 use manifactor_slam::mapping::object_key;
@@ -111,7 +111,11 @@ impl LiveMap {
             self.path.begin_odometry_at(&located.start);
             self.path.correct(|frame| mapper.pose_of(frame));
         }
-        self.notes.take(report, |id| mapper.id_changes().current_id(id));
+        let class = |key: &Key| {
+            let measured = mapper.measurements().objects.iter().find(|object| object_key(object.id) == *key);
+            measured.and_then(Measured::class_name)
+        };
+        self.notes.take(report, |id| mapper.id_changes().current_id(id), class);
         let parked = report
             .updates
             .last()

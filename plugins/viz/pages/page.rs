@@ -10,6 +10,10 @@ pub(crate) struct Page {
     title: String,
     body: String,
     scripts: String,
+    /// Texts of the headings, in order; the anchor of heading `i` is `section-i`.
+    headings: Vec<String>,
+    /// Place of the table of contents in the body.
+    contents: Option<usize>,
     style: &'static str,
     is_live: bool,
 }
@@ -36,7 +40,9 @@ impl Page {
 
     /// Adds a heading with an anchor for links.
     pub(crate) fn heading(&mut self, text: &str) -> &mut Self {
-        self.push(&format!("<h2>{}</h2>", escape(text)))
+        let html = format!("<h2 id=\"section-{}\">{}</h2>", self.headings.len(), escape(text));
+        self.headings.push(text.to_owned());
+        self.push(&html)
     }
 
     /// Adds a heading within a section.
@@ -49,6 +55,17 @@ impl Page {
         self.push(&format!("<p class=\"note\">{}</p>", escape(text)))
     }
 
+    /// Adds the verdict, the one sentence that a reader takes away.
+    pub(crate) fn verdict(&mut self, text: &str) -> &mut Self {
+        self.push(&format!("<p class=\"verdict\">{}</p>", escape(text)))
+    }
+
+    /// Adds a table of contents with a link to each heading of the finished page.
+    pub(crate) fn contents(&mut self) -> &mut Self {
+        self.contents = Some(self.body.len());
+        self
+    }
+
     /// Adds a list of warnings, or nothing if there are none.
     pub(crate) fn warnings(&mut self, texts: &[String]) -> &mut Self {
         let items: String =
@@ -56,12 +73,14 @@ impl Page {
         if texts.is_empty() { self } else { self.push(&format!("<ul>{items}</ul>")) }
     }
 
-    /// Adds terms with their definitions.
-    pub(crate) fn definitions(&mut self, list: &[(&str, &str)]) -> &mut Self {
+    /// Adds terms with their definitions, in a section that is closed at first.
+    pub(crate) fn definitions(&mut self, summary: &str, list: &[(&str, &str)]) -> &mut Self {
         let items =
             list.iter().map(|(word, text)| format!("<dt>{}</dt><dd>{}</dd>", escape(word), escape(text)));
         let items: String = items.collect();
-        if list.is_empty() { self } else { self.push(&format!("<dl>{items}</dl>")) }
+        let summary = escape(summary);
+        let html = format!("<details><summary>{summary}</summary><dl>{items}</dl></details>");
+        if list.is_empty() { self } else { self.push(&html) }
     }
 
     /// Adds links to files by their paths from the page's folder.
@@ -71,9 +90,19 @@ impl Page {
         self.push(&format!("<ul class=\"files\">{links}</ul>"))
     }
 
-    /// Adds a table; numbers are right-aligned.
+    /// Adds a table; numbers are right-aligned. A long or wide table scrolls in its own box.
     pub(crate) fn table(&mut self, header: &[String], rows: &[Vec<String>]) -> &mut Self {
-        let mut html = String::from("<div class=\"wide\" tabindex=\"0\"><table><thead><tr>");
+        self.table_of("wide", header, rows)
+    }
+
+    /// Adds a table whose rows become cards on a narrow screen, each cell with the name of its column.
+    pub(crate) fn cards(&mut self, header: &[String], rows: &[Vec<String>]) -> &mut Self {
+        self.table_of("wide cards", header, rows)
+    }
+
+    fn table_of(&mut self, class: &str, header: &[String], rows: &[Vec<String>]) -> &mut Self {
+        let mut html = format!("<div class=\"{class}\" tabindex=\"0\"><table><thead><tr>");
+        let has_names = class.contains("cards");
         // writing to a String cannot fail
         for (column, cell) in header.iter().enumerate() {
             let cells = || {
@@ -91,9 +120,11 @@ impl Page {
         html += "</tr></thead><tbody>\n";
         for row in rows {
             html += "<tr>";
-            for cell in row {
+            for (column, cell) in row.iter().enumerate() {
                 let class = if is_number(cell) { " class=\"n\"" } else { "" };
-                let _ = write!(html, "<td{class}>{}</td>", escape(cell));
+                let name = header.get(column).filter(|_| has_names);
+                let name = name.map(|name| format!(" data-name=\"{}\"", escape(name))).unwrap_or_default();
+                let _ = write!(html, "<td{class}{name}>{}</td>", escape(cell));
             }
             html += "</tr>\n";
         }
@@ -146,7 +177,9 @@ impl Page {
 
     /// Returns the HTML of the page.
     pub(crate) fn html(&self) -> String {
-        let (title, body) = (escape(&self.title), &self.body);
+        let title = escape(&self.title);
+        let (above, below) = self.body.split_at(self.contents.unwrap_or(0));
+        let contents = if self.contents.is_some() { self.table_of_contents() } else { String::new() };
         let (light, dark) = (style_sheet(Theme::Light), style_sheet(Theme::Dark));
         let theme = format!(":root{{{light}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n");
         let (style, more) = (self.style, if self.is_live { LIVE } else { ("", "") });
@@ -159,9 +192,17 @@ impl Page {
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n\
              <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}{}\">\n{}<title>{title}</title>\n\
-             <style>\n{theme}{STYLE}{style}</style>\n</head>\n<body>\n<main>\n{body}</main>\n{scripts}</body>\n</html>\n",
+             <style>\n{theme}{STYLE}{style}</style>\n</head>\n<body>\n<main>\n{above}{contents}{below}</main>\n{scripts}</body>\n</html>\n",
             more.0, more.1
         )
+    }
+}
+
+impl Page {
+    fn table_of_contents(&self) -> String {
+        let link = |(i, text): (usize, &String)| format!("<a href=\"#section-{i}\">{}</a>", escape(text));
+        let links: Vec<String> = self.headings.iter().enumerate().map(link).collect();
+        format!("<nav class=\"contents\" aria-label=\"contents\">{}</nav>\n", links.join("\n"))
     }
 }
 
@@ -196,6 +237,7 @@ fn is_number(cell: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::canvas::Ink;
     use serde_json::{Value, json};
 
     #[test]
@@ -207,6 +249,50 @@ mod tests {
         assert!(html.contains("<title>a &lt; b</title>") && !html.contains("<script>"));
         assert!(html.contains("<td class=\"n\">0.125</td><td>cup</td>") && html.contains("x &amp; y"));
         assert!(!html.contains("<b>"));
+    }
+
+    #[test]
+    fn each_heading_is_in_the_contents() {
+        let mut page = Page::new("run");
+        page.contents().heading("Results").heading("a <b>");
+        let html = page.html();
+        for (i, text) in ["Results", "a &lt;b&gt;"].iter().enumerate() {
+            assert!(html.contains(&format!("<a href=\"#section-{i}\">{text}</a>")), "{html}");
+            assert!(html.contains(&format!("<h2 id=\"section-{i}\">{text}</h2>")));
+        }
+        assert!(html.find("<nav").unwrap() < html.find("<h2").unwrap());
+        assert!(!Page::new("run").html().contains("<nav"));
+    }
+
+    #[test]
+    fn a_card_names_its_cells() {
+        let mut page = Page::new("run");
+        page.cards(&["a \"b\"".into()], &[vec!["0.5".into()]]);
+        assert!(page.html().contains("data-name=\"a &quot;b&quot;\">0.5</td>"));
+    }
+
+    /// Contrast ratio of two colours, from 1 to 21 (WCAG 2.2, section 1.4.3).
+    fn contrast(a: Ink, b: Ink, theme: Theme) -> f64 {
+        let luminance = |ink: Ink| {
+            let linear = ink.rgb(theme).map(|byte| {
+                let share = f64::from(byte) / 255.0;
+                if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }
+            });
+            0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+        };
+        let (a, b) = (luminance(a), luminance(b));
+        (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    #[test]
+    fn texts_and_links_have_the_contrast_of_level_aa() {
+        for theme in [Theme::Light, Theme::Dark] {
+            for ink in [Ink::Text, Ink::Faint, Ink::Link, Ink::Warning] {
+                let ratio = contrast(ink, Ink::Paper, theme);
+                assert!(ratio >= 4.5, "{ink:?} on {theme:?}: {ratio:.2}");
+            }
+        }
+        assert!(STYLE.contains("a { color: var(--link) }"));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The page of a run: the map in 3D, its variants side by side, and the factors of each object.
 use super::run_tables::{held_out, noise, objects, overview, own_variables, words};
-use super::{page::Page, viewer};
+use super::{page::Page, verdict::verdict, viewer};
 use crate::drawing::{Palette, Picture, Scene, Viewpoint, map};
 use crate::run::{RESIDUALS, cost, images, maps_and_charts, residual_row};
 use manifactor_slam::record::{RunRecord, VariantRecord};
@@ -10,7 +10,7 @@ use manifactor_slam::report::{RunReport, VariantReport};
 pub(super) const WIDTH: f64 = 560.0;
 
 /// Definitions of the terms in the overview.
-const DEFINITIONS: [(&str, &str); 5] = [
+const DEFINITIONS: [(&str, &str); 6] = [
     (
         "ATE",
         "absolute trajectory error: the root mean square of the distances between the estimated and the true positions of the camera, after alignment",
@@ -22,6 +22,10 @@ const DEFINITIONS: [(&str, &str); 5] = [
     ),
     ("quality", "the same where the objects stand: place counts as well"),
     (
+        "volume error",
+        "the mean of |ln(V / V_true)| over the objects that both variants have; V_true is the volume of the ellipsoid that fills the true cuboid",
+    ),
+    (
         "cost",
         "½ Σ ρ(‖r‖²) over all factors, r in standard deviations: comparable between variants of the same factors alone",
     ),
@@ -30,12 +34,19 @@ const DEFINITIONS: [(&str, &str); 5] = [
 /// Returns the page. `record` and `report` have the same variants; `configs` are their resolved configs.
 pub fn run_page(report: &RunReport, record: &RunRecord, configs: &[String]) -> String {
     let mut page = Page::new(&report.title);
-    let (header, rows) = overview(report);
-    page.table(&header, &rows);
-    page.definitions(&about(record));
-    page.definitions(&DEFINITIONS);
+    if let Some(text) = verdict(report, record) {
+        page.verdict(&text);
+    }
     let palette = Palette::of(record);
     in_3d(&mut page, record, &palette);
+    page.contents().heading("Results");
+    let (header, rows) = overview(report);
+    page.cards(&header, &rows);
+    if report.variants.len() > 1 {
+        page.paragraph("In brackets: the change against the first variant. A negative number is better.");
+    }
+    page.definitions("Variants", &about(record));
+    page.definitions("Definitions", &DEFINITIONS);
     side_by_side(&mut page, record, &palette);
     let reports = report.variants.iter().zip(&record.variants).zip(configs);
     for ((report, record), config) in reports {
@@ -52,7 +63,6 @@ fn about(record: &RunRecord) -> Vec<(&str, &str)> {
 
 fn in_3d(page: &mut Page, record: &RunRecord, palette: &Palette) {
     let Some(last) = record.variants.last() else { return };
-    page.heading("Map");
     let scene = Scene::of(format!("{}: {}", record.title, last.name), last);
     let picture = map(&scene, Viewpoint::Top, palette, 1.6 * WIDTH);
     page.own("<div id=\"static-map\">", "");
@@ -62,7 +72,7 @@ fn in_3d(page: &mut Page, record: &RunRecord, palette: &Palette) {
     );
     page.own("</div>", "");
     page.data("run-data", &viewer::data(record, palette));
-    page.own(viewer::MARKUP, &viewer::SCRIPTS.concat()).own("", viewer::REPLAY);
+    page.own(viewer::MARKUP, &viewer::SCRIPTS.concat()).own("", &viewer::REPLAY.concat());
 }
 
 /// Adds each kind of picture once, with the variants next to each other.
@@ -89,13 +99,13 @@ fn side_by_side(page: &mut Page, record: &RunRecord, palette: &Palette) {
 const CAPTIONS: [(&str, &str); 8] = [
     (
         "cost",
-        "The cost after each accepted step, from where the solve began. Costs compare between variants of the same noise and factors alone.",
+        "The cost after each accepted step, as a share of the initial cost. Variants with different factors or noise have different costs, so only the shapes of the curves compare.",
     ),
     (
         "map_top",
-        "the map from above. The true path is dashed, and so are true objects: the ellipsoid that fills the cuboid of each.",
+        "the map from above. The true path is dashed. A dashed object is the ellipsoid that fills the true cuboid; an estimate encloses the whole solid and is therefore larger.",
     ),
-    ("map_side", "the map from the side, up being up."),
+    ("map_side", "the map from the side."),
     ("error_over_time", "distance of each position from the true one, after alignment of the whole path."),
     (
         "relative_error",

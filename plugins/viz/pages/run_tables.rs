@@ -1,5 +1,6 @@
 //! The tables of a run's page.
 use super::page::Page;
+use super::verdict::{percent, relative};
 use manifactor_graph::Key;
 use manifactor_slam::mapping::MappedObject;
 use manifactor_slam::record::VariantRecord;
@@ -29,14 +30,22 @@ pub(super) fn overview(report: &RunReport) -> (Vec<String>, Vec<Vec<String>>) {
         "converged",
     ];
     let number = |x: Option<f64>| x.map_or_else(|| "-".into(), |x| format!("{x:.5}"));
-    let row = |row: VariantRow| {
+    let table = report.table();
+    let first = table.first().cloned();
+    // the error of a row, with its change against the first row
+    let error = |row: &VariantRow, of: fn(&VariantRow) -> Option<f64>| {
+        let before = first.as_ref().filter(|first| first.variant != row.variant).and_then(of);
+        let change = before.zip(of(row)).and_then(|(before, after)| relative(before, after));
+        number(of(row)) + &change.map(|change| format!(" ({})", percent(change))).unwrap_or_default()
+    };
+    let row = |row: &VariantRow| {
         vec![
-            row.variant,
+            row.variant.clone(),
             number(row.odometry_ate),
-            number(row.ate),
-            number(row.position),
-            number(row.shape),
-            number(row.quality),
+            error(row, |row| row.ate),
+            error(row, |row| row.position),
+            error(row, |row| row.shape),
+            error(row, |row| row.quality),
             row.objects.to_string(),
             row.boxes.to_string(),
             row.semantic_factors.to_string(),
@@ -45,7 +54,7 @@ pub(super) fn overview(report: &RunReport) -> (Vec<String>, Vec<Vec<String>>) {
             if row.converged { "yes" } else { "no" }.into(),
         ]
     };
-    (words(header), report.table().into_iter().map(row).collect())
+    (words(header), table.iter().map(row).collect())
 }
 
 /// Adds the noise, if it was estimated.

@@ -19,7 +19,8 @@ pub(super) const SCRIPTS: [&str; 6] = [
     include_str!("assets/panels.js"),
     include_str!("assets/map.js"),
 ];
-pub(super) const REPLAY: &str = include_str!("assets/replay.js");
+/// Scripts of a finished run, in order of their dependencies.
+pub(super) const REPLAY: [&str; 2] = [include_str!("assets/cursor.js"), include_str!("assets/replay.js")];
 
 /// Returns the data for the script. Metres are rounded to 0.01 mm and pixels to a tenth, below the visible
 /// resolution.

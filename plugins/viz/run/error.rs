@@ -1,7 +1,7 @@
 //! Errors against the truth over time, as in evo.
-use super::{TIME, clock};
+use super::clock;
 use crate::canvas::Ink;
-use crate::drawing::{Chart, Curve, Picture, figure};
+use crate::drawing::{Chart, Curve, Picture, TIME, figure};
 use manifactor_formats::words::count;
 use manifactor_slam::record::{FrameRecord, PoseRecord, VariantRecord};
 

@@ -1,7 +1,7 @@
 //! True, odometry and estimated position and orientation over time, as in evo.
-use super::{TIME, clock};
+use super::clock;
 use crate::canvas::Ink;
-use crate::drawing::{Chart, Curve, Picture, figure};
+use crate::drawing::{Chart, Curve, Picture, TIME, figure};
 use manifactor_geometry::Se3;
 use manifactor_slam::record::{FrameRecord, VariantRecord};
 

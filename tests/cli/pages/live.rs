@@ -131,7 +131,10 @@ fn a_page_shows_the_map_as_it_grows() {
     browser.until("canvas.dataset.selected !== ''");
     let told = browser.value("document.getElementById('object').textContent");
     let told = told.as_str().unwrap();
-    assert!(told.contains("semi-axes (m)") && told.contains("boxes") && !told.contains("seen in"), "{told}");
+    assert!(
+        told.contains("semi-axes (m)") && told.contains("boxes") && !told.contains("detected in"),
+        "{told}"
+    );
     browser.was_quiet();
     // a late browser gets the whole state, on a phone too
     for (width, scheme) in [(1280, "dark"), (390, "dark"), (1280, "light")] {

@@ -70,6 +70,11 @@ fn the_map_turns_zooms_and_tells_of_an_object() {
         assert_eq!(browser.value("document.documentElement.dataset.map"), "webgl");
         let wide = browser.value("document.documentElement.scrollWidth").as_f64().unwrap();
         assert!(wide <= f64::from(width), "{wide} of {width} pixels");
+        // the map is the first thing below the verdict
+        let top = browser.value("canvas.getBoundingClientRect().top").as_f64().unwrap();
+        assert!(top < 400.0, "at {width} pixels the map begins at {top}");
+        let verdict = browser.value("document.querySelector('.verdict').textContent");
+        assert!(verdict.as_str().unwrap().contains("ours beside QuadricSLAM"), "{verdict}");
         browser.value("document.getElementById('map').scrollIntoView()");
         browser.keep(&format!("map_{width}_{scheme}"));
         // the text of a plot follows the page's theme
@@ -94,6 +99,22 @@ fn the_map_turns_zooms_and_tells_of_an_object() {
         assert!(told.as_str().unwrap().contains(text), "{text}: {told}");
     }
     browser.keep("picked");
+    // the wheel zooms if the map has the focus, and scrolls the page otherwise
+    let wheel = |browser: &mut Browser| {
+        let event =
+            serde_json::json!({ "type": "mouseWheel", "x": at[0], "y": at[1], "deltaX": 0, "deltaY": 40 });
+        browser.call("Input.dispatchMouseEvent", event);
+    };
+    let near = number(&mut browser, "mapView.orbit.distance");
+    wheel(&mut browser);
+    browser.until(&format!("mapView.orbit.distance > {near}"));
+    let (far, scrolled) = (number(&mut browser, "mapView.orbit.distance"), number(&mut browser, "scrollY"));
+    browser.value("canvas.blur(); 0");
+    wheel(&mut browser);
+    browser.until(&format!("scrollY > {scrolled}"));
+    assert_eq!(number(&mut browser, "mapView.orbit.distance"), far);
+    browser.value(&format!("scrollTo(0, {scrolled}); mapView.orbit.reset(); 0"));
+    browser.until(&format!("scrollY === {scrolled}"));
     let azimuth = number(&mut browser, "mapView.orbit.azimuth");
     browser.drag(at, [80.0, 30.0]);
     browser.until("canvas.dataset.drawn > 0");
@@ -105,6 +126,21 @@ fn the_map_turns_zooms_and_tells_of_an_object() {
     assert!((ratio - 2.0).abs() < 0.1, "{ratio}");
     browser.value("const time = document.getElementById('time'); time.value = 12; time.dispatchEvent(new Event('input')); 0");
     browser.until("canvas.dataset.frame === '12'");
+    // all charts over time have the cursor at this frame, and a press on a chart moves the map
+    let cursors = "document.querySelectorAll('svg .cursor').length";
+    assert!(number(&mut browser, cursors) >= 12.0);
+    assert_eq!(browser.value(cursors), browser.value("document.querySelectorAll('svg[data-time]').length"));
+    browser.value("mapView.goToTime(mapView.longest.frames[7][0] + 0.01); 0");
+    browser.until("canvas.dataset.frame === '7'");
+    // an overlay has one view for all variants
+    browser.value("document.querySelector('[data-show=overlay]').click(); 0");
+    browser.until(
+        "mapView.parts().length === 1 && document.getElementById('key').textContent.includes('rings')",
+    );
+    browser.keep("overlay");
+    browser.value(
+        "document.querySelector('[data-show=overlay]').click(); document.getElementById('fit').click(); 0",
+    );
     browser.value("document.querySelector('[data-show=error]').click(); 0");
     browser.until("document.getElementById('key').textContent.includes('error of the estimated path')");
     browser.keep("errors");
@@ -169,6 +205,11 @@ fn the_report_of_an_experiment_needs_no_network() {
     browser.show(&page, 390, "dark");
     assert_eq!(browser.value("document.querySelectorAll('svg').length"), html.matches("<svg").count());
     assert!(browser.value("document.documentElement.scrollWidth").as_f64().unwrap() <= 390.0);
+    // on a narrow screen each cell of the summary has its column's name, and none is off the screen
+    let cell = "[...document.querySelectorAll('.cards td')].every(cell => {
+        const { left, right } = cell.getBoundingClientRect();
+        return left >= 0 && right <= 390 && getComputedStyle(cell, '::before').content.length > 2; })";
+    assert_eq!(browser.value(cell), true);
     browser.was_quiet();
 }
 

@@ -18,12 +18,12 @@ function columns(pose) {
   ];
 }
 
-// The semi-axes of a shape, none so short that it cannot be seen.
+// The semi-axes of a shape, lengthened to a visible minimum.
 function axes(shape) {
   return columns(shape).map((column, i) => scaled(column, Math.max(shape[7 + i], 1e-4)));
 }
 
-// A point of a pose's own frame in the outer one.
+// Transforms a point from the frame of a pose to the outer frame.
 function act(pose, p) {
   const [a, b, c] = columns(pose);
   return [0, 1, 2].map(i => pose[i] + a[i] * p[0] + b[i] * p[1] + c[i] * p[2]);
@@ -47,7 +47,7 @@ function lookAt(eye, target, up) {
   return [x[0], y[0], z[0], 0, x[1], y[1], z[1], 0, x[2], y[2], z[2], 0, -dot(x, eye), -dot(y, eye), -dot(z, eye), 1];
 }
 
-// Where a ray first meets an ellipsoid, as a multiple of its direction; Infinity where it does not.
+// The first intersection of a ray with an ellipsoid, as a multiple of the direction; Infinity without one.
 function meets(shape, origin, direction) {
   const parts = columns(shape), away = sub(origin, shape);
   const into = v => parts.map((column, i) => dot(column, v) / Math.max(shape[7 + i], 1e-4));

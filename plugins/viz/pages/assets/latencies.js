@@ -1,4 +1,4 @@
-// The latencies of the newest frames, on an axis of powers.
+// The latencies of the newest frames, on a logarithmic axis.
 const LEVELS = [["p50", "#2a85d8"], ["p99", "#c8702a"], ["max", "#d7373f"]];
 
 function svg(name, attributes, text = "") {
@@ -23,7 +23,7 @@ function latencyChart(panel, latencies) {
   }
   chart.append(svg("text", { x: left, y: height - 4 }, `ms, the last ${ms.length} frame${ms.length > 1 ? "s" : ""}`));
   chart.append(svg("polyline", { points: logs.map((log, i) => `${x(i).toFixed(1)},${y(log).toFixed(1)}`).join(" "), fill: "none", stroke: "var(--text)", "stroke-width": 1.2, "stroke-linejoin": "round" }));
-  // names that would lie on one another move apart, the largest level on top
+  // labels that would overlap move apart, the largest level on top
   let free = -Infinity;
   for (const [i, [name, color]] of [...LEVELS.entries()].reverse()) {
     const at = y(Math.log10(Math.max(latencies[name], 1e-3)));

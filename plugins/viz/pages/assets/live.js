@@ -1,6 +1,6 @@
-// A map that grows: its server sends whole states, and the newest is shown. All text goes in as text.
+// A growing map. The server sends complete states, and the page shows the newest. Text is never parsed as HTML.
 class GrowingMap extends MapView {
-  // The view stays as it is until what there is to see has outgrown it.
+  // The view keeps its extent until the map has outgrown it.
   take(run) {
     const before = this.extent;
     super.take(run);
@@ -11,7 +11,7 @@ class GrowingMap extends MapView {
     if (this.state) this.controls();
   }
 
-  // The newest frame is shown.
+  // Shows the newest frame.
   controls() {
     this.state.frame = Math.max(this.run.variants[0].frames.length - 1, 0);
   }
@@ -22,12 +22,15 @@ class GrowingMap extends MapView {
   }
 }
 
+// Names of the counts of events.
+const COUNTS = { born: "added", withdrawn: "removed", moved: "boxes moved", merged: "merged", forgotten: "dropped", refused: "refused", rejected: "outliers" };
+
 class LivePage {
   constructor() {
     this.find = id => document.getElementById(id);
     this.page = document.documentElement;
     this.page.classList.add("live");
-    // it changes with each frame: nobody wants to hear that
+    // a screen reader does not read an object that changes with each frame
     this.find("object").ariaLive = "off";
     this.listen();
     setInterval(() => this.tellPhase(), 1000);
@@ -38,7 +41,7 @@ class LivePage {
     source.onmessage = ({ data }) => {
       this.trouble = null;
       this.take(JSON.parse(data));
-      // the server goes with the program
+      // the server ends with the program
       if (this.state.phase === "ended") source.close();
     };
     source.onerror = () => {
@@ -55,11 +58,11 @@ class LivePage {
     document.title = document.querySelector("h1").textContent = state.title || "Live map";
     pairs(this.find("facts"), [["frames", state.frames], ["time stamp (s)", state.timestamp.toFixed(3)], ["objects", mapped.length],
       ["boxes in the frame", last?.[6].length ?? 0], ["boxes so far", state.boxes], ["cost", state.cost?.toPrecision(5) ?? "-"]]);
-    pairs(this.find("counts"), Object.entries(counts));
+    pairs(this.find("counts"), Object.entries(counts).map(([name, count]) => [COUNTS[name] ?? name, count]));
     latencyChart(this.find("latencies"), state.latencies);
     list(this.find("notes"), newest.toReversed().map(([frame, text]) => `frame ${frame}: ${text}`));
     const more = state.waiting - state.undetermined.length;
-    this.find("waiting").textContent = state.waiting ? "Variables that wait for factors, and directions that nothing constrains:" : "Nothing waits.";
+    this.find("waiting").textContent = state.waiting ? "Variables without enough factors, and directions that no factor constrains:" : "No variable is undetermined.";
     list(this.find("undetermined"), more > 0 ? [...state.undetermined, `and ${more} more`] : state.undetermined);
     this.listObjects(mapped);
     this.tellPhase();
@@ -97,19 +100,19 @@ class LivePage {
 
   tellPhase() {
     const phase = this.state?.phase ?? "connecting", idle = Math.floor((performance.now() - this.moved) / 1000);
-    const names = { connecting: "connecting", waiting: "waiting for the first frame", running: "running", solving: "all frames have come", ended: "ended",
+    const names = { connecting: "connecting", waiting: "waiting for the first frame", running: "running", solving: "all frames have arrived", ended: "ended",
       lost: "connection lost", refused: "refused" };
     const shown = phase === "ended" ? phase : this.trouble ?? phase;
     const words = { running: idle > 2 ? `no frame for ${idle} s` : "", solving: `solving all as one batch: ${this.state?.words}`, ended: this.state?.words,
-      lost: "trying again; what is shown is the last that came", refused: "open the address as it was told, with its token" };
+      lost: "trying again; the page shows the last state that arrived", refused: "open the printed address with its token" };
     this.page.dataset.phase = shown;
-    // a screen reader reads it where it changes
+    // a screen reader reads each change
     for (const [id, text] of [["phase", names[shown]], ["words", words[shown] ?? ""]])
       if (this.find(id).textContent !== text) this.find(id).textContent = text;
   }
 }
 
-// Makes the children of a list anew where what they show has changed, so that a reader can select them.
+// Replaces the children of a list only if their content has changed, so that a reader can select text.
 function refill(parent, items, made) {
   const text = JSON.stringify(items);
   if (parent.shown === text) return;

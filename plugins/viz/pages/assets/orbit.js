@@ -9,6 +9,8 @@ class Orbit {
     for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, event => this.up_(event));
     canvas.addEventListener("contextmenu", event => event.preventDefault());
     canvas.addEventListener("wheel", event => {
+      // without the focus, the wheel scrolls the page
+      if (document.activeElement !== canvas && !event.ctrlKey && !event.metaKey) return;
       event.preventDefault();
       this.zoom(Math.exp(0.0015 * event.deltaY * (event.deltaMode ? 20 : 1)));
     }, { passive: false });
@@ -18,7 +20,7 @@ class Orbit {
     });
   }
 
-  // All of what there is to see: until somebody turns it, it is looked at from there.
+  // Sets the home view, which shows the whole map, and uses it until the user moves the map.
   aim(up, { middle, radius }) {
     Object.assign(this, { up, reach: radius, home: { target: middle, distance: 2.35 * radius, azimuth: -0.9, height: 0.65 } });
     if (!this.moved) this.reset();
@@ -27,6 +29,12 @@ class Orbit {
   reset() {
     Object.assign(this, { ...this.home, moved: false });
     this.changed();
+  }
+
+  // Looks at a sphere, from the same side as before.
+  fit({ middle, radius }) {
+    Object.assign(this, { target: middle, distance: 2.35 * radius });
+    this.turned();
   }
 
   turned() {
@@ -42,7 +50,7 @@ class Orbit {
   }
 
   matrix(aspect) {
-    // as much is seen in a narrow view
+    // a narrow view shows as much as a wide one
     const fovy = aspect < 1 ? 2 * Math.atan(Math.tan(0.39) / Math.max(aspect, 0.4)) : 0.78;
     const far = this.distance + 20 * this.reach;
     return product(perspective(fovy, aspect, Math.max(this.distance / 200, far / 1e5), far), lookAt(this.eye, this.target, this.up));
@@ -68,7 +76,8 @@ class Orbit {
 
   down(event) {
     this.canvas.setPointerCapture(event.pointerId);
-    this.canvas.focus({ preventScroll: true });
+    // a finger gives the map the focus by a tap: until then, a swipe scrolls the page
+    if (event.pointerType !== "touch") this.canvas.focus({ preventScroll: true });
     this.pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
     this.travelled = this.pointers.size > 1 ? Infinity : 0;
   }
@@ -92,8 +101,10 @@ class Orbit {
   }
 
   up_(event) {
-    if (this.pointers.delete(event.pointerId) && this.travelled < 5 && event.type === "pointerup")
+    if (this.pointers.delete(event.pointerId) && this.travelled < 5 && event.type === "pointerup") {
+      this.canvas.focus({ preventScroll: true });
       this.tapped(event.offsetX, event.offsetY);
+    }
   }
 
   key({ key, shiftKey }) {

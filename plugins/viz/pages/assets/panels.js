@@ -1,4 +1,4 @@
-// What stands beside the map: the images of a frame, and what is known of an object. All text goes in as text.
+// The panels beside the map: the images of a frame, and the details of an object. Text is never parsed as HTML.
 function element(name, text = "", attributes = {}) {
   const made = document.createElement(name);
   made.textContent = text;
@@ -43,7 +43,7 @@ function drawImage(canvas, variant, frame, selected, style) {
     draw.setLineDash([6 * pixel, 4 * pixel]);
     draw.strokeRect(xmin, ymin, xmax - xmin, ymax - ymin);
     draw.setLineDash([]);
-    // a name that would lie on another is left out: the map has its colour
+    // a name that would overlap another is omitted; the map has its colour
     const name = label ?? object?.class ?? "", left = Math.max(xmin, 0) + 2 * pixel, wide = draw.measureText(name).width;
     const below = [Math.max(ymin - 3 * pixel, 12 * pixel), ymax + 13 * pixel].find(y =>
       !taken.some(t => left < t[2] && t[0] < left + wide && y - 12 * pixel < t[3] && t[1] < y));
@@ -53,12 +53,12 @@ function drawImage(canvas, variant, frame, selected, style) {
   }
 }
 
-// All that is known of an object, a column for each variant that is shown.
+// The details of an object, with a column for each shown variant.
 function describe(panel, variants, id, frame) {
   panel.replaceChildren();
   const found = variants.map(v => v.objects.find(o => o.id === id)), any = found.find(Boolean);
   if (!any) {
-    panel.append(element("p", "Click an object, or press n and p on the map, to see its class, axes, rule, factors and residuals.", { class: "note" }));
+    panel.append(element("p", "Click an object, or press n and p on the map, to see its class, semi-axes, rule, factors and residuals.", { class: "note" }));
     return;
   }
   const heading = element("h3", "");
@@ -78,7 +78,7 @@ function describe(panel, variants, id, frame) {
     line.append(element("td"), ...variants.map(v => element("th", v.name, { scope: "col" })));
     body.append(line);
   }
-  const lengths = shape => shape?.slice(7).map(x => x.toFixed(3)).join(" × ");
+  const lengths = shape => shape?.slice(7).sort((a, b) => b - a).map(x => x.toFixed(3)).join(" × ");
   const residual = f => f.residual.length ? `, r = (${f.residual.join(", ")}) σ` : "";
   row("score", o => o.score?.toFixed(2));
   row("semi-axes (m)", o => lengths(o.estimate));
@@ -96,9 +96,9 @@ function describe(panel, variants, id, frame) {
     const projected = e && [e[0] - Math.sqrt(e[2]), e[1] - Math.sqrt(e[4]), e[0] + Math.sqrt(e[2]), e[1] + Math.sqrt(e[4])];
     return `measured ${measured.map(x => x.toFixed(0)).join(" ")}${projected ? `, estimated ${projected.map(x => x.toFixed(0)).join(" ")}` : ""}`;
   });
-  // while frames come, boxes of the newest alone are known
+  // a live map has the boxes of the newest frame only
   const frames = variants.map(v => v.frames.every(f => f[6]) ? v.frames.flatMap((f, i) => f[6].some(box => box[0] === id) ? [i] : []) : []);
-  row("seen in frames", o => {
+  row("detected in frames", o => {
     const of = frames[found.indexOf(o)];
     return of.length ? `${of.length}, from ${of[0]} to ${of[of.length - 1]}` : undefined;
   });

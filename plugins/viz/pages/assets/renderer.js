@@ -21,7 +21,7 @@ void main() {
   float lit = 0.62 + 0.28 * dot(n, above) + 0.22 * abs(dot(n, e));
   float rim = pow(1.0 - abs(dot(n, e)), 3.0);
   vec3 shaded = tint.rgb * lit + 0.1 * pow(max(dot(n, normalize(e + above)), 0.0), 24.0);
-  // what is picked has a bright rim
+  // a selected object has a bright rim
   result = vec4(mix(shaded, vec3(1.0), tint.a > 0.5 ? 0.25 + 0.75 * rim : 0.0), 1.0);
 }`];
 
@@ -32,7 +32,7 @@ out vec3 tint; out float along; flat out float dashed;
 void main() {
   vec4 p = camera * vec4(from, 1.0), q = camera * vec4(to, 1.0);
   float near = 1e-4;
-  // what is behind the eye is cut off where it passes it
+  // the part behind the eye is cut off
   vec4 p0 = p.w < near ? mix(p, q, (near - p.w) / (q.w - p.w)) : p;
   vec4 q0 = q.w < near ? mix(q, p, (near - q.w) / (p.w - q.w)) : q;
   vec4 at = corner.x < 0.5 ? p0 : q0;
@@ -54,7 +54,7 @@ void main() {
 }`];
 
 class Renderer {
-  // Throws where there is no WebGL 2.
+  // Throws without WebGL 2.
   constructor(canvas) {
     this.canvas = canvas;
     const gl = this.gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
@@ -71,7 +71,7 @@ class Renderer {
     gl.enable(gl.SCISSOR_TEST);
   }
 
-  // A program, the mesh of one instance, and what is read of each instance.
+  // A program, the mesh of one instance, and the attributes of each instance.
   kind([vertex, fragment], own, width, mesh, fields) {
     const gl = this.gl, program = gl.createProgram();
     for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
@@ -112,7 +112,7 @@ class Renderer {
     return numbers.length / kind.stride;
   }
 
-  // The canvas has as many pixels as the screen shows of it.
+  // Gives the canvas one pixel for each pixel of the screen.
   resize() {
     const ratio = Math.min(window.devicePixelRatio || 1, 2), { clientWidth, clientHeight } = this.canvas;
     const [width, height] = [Math.round(clientWidth * ratio), Math.round(clientHeight * ratio)];

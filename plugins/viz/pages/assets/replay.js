@@ -1,6 +1,6 @@
-// The map of a run that has ended: its variants to choose from, and its frames to go through.
+// The map of a finished run, with controls for its variants and frames.
 class Replay extends MapView {
-  // On a wide screen the first variant and the last; else the last alone.
+  // On a wide screen the first and the last variant, otherwise the last.
   first() {
     const last = this.run.variants.length - 1;
     return last > 0 && window.innerWidth > 900 ? [0, last] : [last];
@@ -10,7 +10,7 @@ class Replay extends MapView {
     return Math.max(...this.variants.map(v => v.frames.length), 1);
   }
 
-  // The longest of the variants shown tells the time.
+  // The longest shown variant defines the time.
   get longest() {
     return this.variants.reduce((a, b) => (b.frames.length > a.frames.length ? b : a));
   }
@@ -28,6 +28,8 @@ class Replay extends MapView {
       });
       bar.append(button);
     });
+    this.cursor = new TimeCursor(seconds => this.goToTime(seconds));
+    if (this.run.variants.length < 2) this.find("overlay").style.display = "none";
     this.canvas.ariaLabel += " Comma and full stop go from frame to frame, space replays.";
     time.addEventListener("input", () => this.goTo(+time.value));
     this.find("play").addEventListener("click", () => this.play());
@@ -45,14 +47,21 @@ class Replay extends MapView {
     const { frames, every } = this.longest, seconds = frames[this.state.frame]?.[0];
     const thinned = every > 1 ? ` (every ${every}th is shown)` : "";
     this.find("clock").textContent = `frame ${this.state.frame * every}${seconds == null ? "" : `, ${seconds.toFixed(2)} s`}${thinned}`;
+    if (seconds != null) this.cursor.show(seconds);
     this.redraw();
+  }
+
+  // Goes to the frame that is nearest to a time.
+  goToTime(seconds) {
+    const { frames } = this.longest, away = i => Math.abs(frames[i][0] - seconds);
+    this.goTo(frames.reduce((best, _, i) => (away(i) < away(best) ? i : best), 0));
   }
 
   play() {
     const button = this.find("play"), begun = performance.now(), from = this.state.frame >= this.frames - 1 ? 0 : this.state.frame;
     this.playing = !this.playing;
     button.textContent = this.playing ? "⏸ pause" : "▶ replay";
-    // all of it in at most half a minute
+    // the whole replay takes at most half a minute
     const rate = Math.max(15, this.frames / 30);
     const step = now => {
       if (!this.playing) return;
@@ -73,7 +82,7 @@ class Replay extends MapView {
   }
 }
 
-// Where there is no WebGL 2, the picture from above stays in its place, and says so.
+// Without WebGL 2, the picture from above remains, and its caption has the reason.
 try {
   window.mapView = new Replay(JSON.parse(document.getElementById("run-data").textContent));
 } catch (error) {

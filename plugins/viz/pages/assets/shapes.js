@@ -1,4 +1,4 @@
-// What is drawn of a variant: lists of numbers for the renderer.
+// The shapes of a variant, as lists of numbers for the renderer.
 
 // The triangles of a sphere of radius 1.
 function sphere(rings = 20, sectors = 32) {
@@ -24,7 +24,7 @@ class Segments {
   add(a, b, color, width, { to = color, along = 0, dashed = false } = {}) {
     this.numbers.push(...a.slice(0, 3), ...b.slice(0, 3), ...color, ...to, along, width, dashed ? 1 : 0);
   }
-  // A path through the points that are known, with no line where more are missing than five times as many as usual.
+  // A path through the known points. A gap of more than five usual steps has no line.
   path(points, width, color, dashed = false) {
     const known = [...points.keys()].filter(i => points[i]), steps = known.slice(1).map((k, i) => k - known[i]);
     const gap = 5 * (steps.toSorted((a, b) => a - b)[steps.length >> 1] ?? 1);
@@ -45,6 +45,18 @@ class Segments {
       this.add(corner, corners[(i + 1) % 4], color, thick);
     });
   }
+  // The three principal ellipses of an ellipsoid.
+  rings(shape, color, thick, corners = 40) {
+    const parts = axes(shape);
+    for (let i = 0; i < 3; i++) {
+      const [a, b] = [parts[i], parts[(i + 1) % 3]];
+      const at = k => {
+        const angle = 2 * Math.PI * k / corners;
+        return add(shape, add(scaled(a, Math.cos(angle)), scaled(b, Math.sin(angle))));
+      };
+      for (let k = 0; k < corners; k++) this.add(at(k), at(k + 1), color, thick);
+    }
+  }
   // The edges of a cuboid.
   cuboid(shape, color, thick) {
     const corner = bits => act(shape, [0, 1, 2].map(i => (bits >> i & 1 ? 1 : -1) * shape[7 + i]));
@@ -60,12 +72,12 @@ function level(up) {
   return [right, cross(up, right)];
 }
 
-// The middle of what there is to see, its radius, and the height of its lowest object along up.
+// The middle and the radius of the map, and the height of its lowest object along up.
 function extent(variants) {
   const shapes = variants.flatMap(v => v.objects).flatMap(o => [o.truth, o.estimate]).filter(Boolean);
   const cameras = variants.flatMap(v => v.frames).map(f => f[4]);
   const all = [...cameras, ...shapes].filter(p => p.slice(0, 3).every(Number.isFinite));
-  // the odd object far away is not what the map is about
+  // single far objects do not count
   const middle = [0, 1, 2].map(i => {
     const sorted = all.map(p => p[i]).sort((a, b) => a - b);
     return sorted.length ? (sorted[Math.floor(sorted.length * 0.02)] + sorted[Math.floor((sorted.length - 1) * 0.98)]) / 2 : 0;
@@ -75,6 +87,16 @@ function extent(variants) {
   const up = variants[0].up, near = shapes.filter(s => norm(sub(s, middle)) <= 1.5 * radius);
   const low = near.map(s => dot(s, up) - Math.hypot(...axes(s).map(a => dot(a, up)))).sort((a, b) => a - b);
   return { middle, radius, floor: low.length ? low[Math.floor(low.length * 0.1)] : dot(middle, up) - radius };
+}
+
+// The sphere around the estimated objects without single far ones; null without an object.
+function objectsExtent(variants) {
+  const shapes = variants.flatMap(v => v.objects).map(o => o.estimate).filter(Boolean);
+  if (!shapes.length) return null;
+  const median = list => list.sort((a, b) => a - b)[list.length >> 1];
+  const middle = [0, 1, 2].map(i => median(shapes.map(s => s[i])));
+  const reach = shapes.map(s => norm(sub(s, middle)) + Math.max(...s.slice(7))).sort((a, b) => a - b);
+  return { middle, radius: Math.max(reach[Math.floor((reach.length - 1) * 0.95)], 1e-3) };
 }
 
 // A grid on the floor, with round spacing, and an arrow along gravity.

@@ -1,4 +1,5 @@
 //! Events of the map: their counts, and the newest as text.
+use manifactor_graph::Key;
 use manifactor_slam::association::DetectionMove;
 use manifactor_slam::online::FrameReport;
 use manifactor_slam::sequence::ObjectId;
@@ -27,15 +28,20 @@ pub(super) struct Notes {
 }
 
 impl Notes {
-    /// Adds the events of a frame; `now` maps an object to its current id.
-    pub(super) fn take(&mut self, report: &FrameReport, now: impl Fn(ObjectId) -> ObjectId) {
+    /// Adds the events of a frame. `now` maps an object to its current id, and `class` a key to its class.
+    pub(super) fn take<'a>(
+        &mut self,
+        report: &FrameReport,
+        now: impl Fn(ObjectId) -> ObjectId,
+        class: impl Fn(&Key) -> Option<&'a str>,
+    ) {
         let frame = report.frame;
         if let Some(located) = &report.located {
             // earlier counts refer to the discarded map, and this report covers all frames
             let (frames, newest) = (self.left_out, std::mem::take(&mut self.newest));
             *self = Self { left_out: frames, refused: frames, newest, ..Self::default() };
             let matches = located.matches.len();
-            self.note(frame, &format!("the place in the prior map is found, by {matches} objects: names and poses are of that map from now on"));
+            self.note(frame, &format!("the place in the prior map is found, by {matches} objects; from now on, ids and poses are those of that map"));
         }
         self.born += report.initialized.len();
         self.withdrawn += report.removed.len();
@@ -43,27 +49,31 @@ impl Notes {
         self.merged += report.merged.len();
         self.forgotten += report.forgotten.len();
         for key in &report.initialized {
-            self.note(frame, &format!("{key} came into the map"));
+            let class = class(key).map(|class| format!(" ({class})")).unwrap_or_default();
+            self.note(frame, &format!("{key}{class} was added to the map"));
         }
         for key in &report.removed {
             self.note(
                 frame,
-                &format!("{key} was withdrawn: its boxes are those of several things, or are others now"),
+                &format!(
+                    "{key} was removed: its boxes show several objects, or belong to another object now"
+                ),
             );
         }
         for DetectionMove { frame: of, from, into, .. } in &report.moved {
             self.note(frame, &format!("a box of frame {of} shows object {into}, not {from}"));
         }
         for merge in &report.merged {
-            self.note(frame, &format!("object {} merged into {}", merge.from, now(merge.into)));
+            self.note(frame, &format!("object {} was merged into {}", merge.from, now(merge.into)));
         }
         for id in &report.forgotten {
-            self.note(frame, &format!("object {id} forgotten: it was seen too rarely"));
+            self.note(frame, &format!("object {id} was dropped: it has too few detections"));
         }
         for update in &report.updates {
             self.rejected += update.rejected.len();
             self.rejected = self.rejected.saturating_sub(update.readmitted.len());
-            for (factors, what) in [(&update.rejected, "rejected as outliers"), (&update.readmitted, "back")]
+            for (factors, what) in
+                [(&update.rejected, "rejected as outliers"), (&update.readmitted, "readmitted")]
             {
                 if !factors.is_empty() {
                     self.note(frame, &format!("factors {what}: {}", factors.len()));
