@@ -11,15 +11,15 @@ use manifactor_graph::loss::{Cauchy, ErasedLoss, GemanMcClure, Huber, L2, Tukey}
 use manifactor_graph::{Graph, Noise, Values};
 use manifactor_quadric::DualQuadric;
 use manifactor_semantic as _;
-use manifactor_slam::experiment::{self, Experiment, Summary, TrialLog, trials_table};
-use manifactor_slam::mapping::measurements::Measured;
+use manifactor_slam::experiment::{self, Experiment, ExperimentSummary, TrialLog, trials_table};
+use manifactor_slam::mapping::measurements::ObjectMeasurements;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::output::OutputFolder;
 use manifactor_slam::record::VariantRecord;
-use manifactor_slam::run::{Run, Watch};
+use manifactor_slam::run::{Run, StreamWatcher};
 use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::Observation;
-use manifactor_slam::source::Folders;
+use manifactor_slam::source::InputFolders;
 use manifactor_solve::{
     Dogleg, GaussNewton, Interrupt, LevenbergMarquardt, Optimizer, Silent, Solution, solve,
 };
@@ -93,7 +93,7 @@ fn records(name: &str) -> Fallible<Vec<VariantRecord>> {
     let document = RunDocument::read(&document(name)?)?;
     let mut run = Run::new(&document, None);
     let mut record = |variant| -> Fallible<VariantRecord> {
-        Ok(VariantRecord::new(variant, &run.variant(variant, &mut Silent)?.0))
+        Ok(VariantRecord::new(variant, &run.run_variant(variant, &mut Silent)?.0))
     };
     document.variants.iter().map(&mut record).collect()
 }
@@ -127,8 +127,8 @@ struct Snapshots {
 /// Number of frames between two snapshots.
 const EVERY: usize = 4;
 
-impl Watch for Snapshots {
-    fn frame(
+impl StreamWatcher for Snapshots {
+    fn on_frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
         _: Option<&Observation>,
@@ -150,7 +150,7 @@ impl Watch for Snapshots {
     }
 }
 
-fn class(object: &Measured) -> String {
+fn class(object: &ObjectMeasurements) -> String {
     object.class_name().unwrap_or("unknown").to_owned()
 }
 
@@ -173,7 +173,7 @@ fn grown() -> Fallible<&'static Grown> {
     let variant = document.variants.first().ok_or("the document has no variant")?;
     let mut snapshots = Snapshots { movie: None, seen: 0 };
     let mut run = Run::new(&document, None);
-    let (estimate, report) = run.variant_online(variant, &mut snapshots, &mut Silent)?;
+    let (estimate, report) = run.run_variant_online(variant, &mut snapshots, &mut Silent)?;
     let seconds = report.online.map(|online| online.seconds).unwrap_or_default();
     let movie = snapshots.movie.ok_or("no frame was mapped")?;
     let record = VariantRecord::new(variant, &estimate);
@@ -335,12 +335,12 @@ fn differences() -> Fallible<String> {
     let mut sweep = Experiment::read(&document("orientation.toml")?)?;
     let folder = root().join("target/figures/orientation");
     sweep.output.clone_from(&folder);
-    let folders = Folders { data: None, document: sweep.folder.clone() };
+    let folders = InputFolders { data: None, document: sweep.folder.clone() };
     let claimed =
         OutputFolder::claim(&folder, "experiment", &root().join("examples/figures/orientation.toml"), true)?;
     let mut journal = TrialLog::open(claimed)?;
     experiment::run(&sweep, &folders, &mut journal, 1, &Interrupt::default(), |_| {})?;
-    let (summary, trials) = (Summary::new(&sweep, &journal), trials_table(&sweep, &journal));
+    let (summary, trials) = (ExperimentSummary::new(&sweep, &journal), trials_table(&sweep, &journal));
     let pictures = experiment_pictures(&sweep, &summary, &trials, WIDTH / 2.0);
     let differences = pictures.into_iter().filter(|picture| picture.name.ends_with("_differences"));
     let parts: Vec<Picture> = differences.take(2).collect();

@@ -7,7 +7,7 @@ use crate::drawing::{HEAD, LABELS, Picture, Viewpoint, ellipsoid, title};
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::Direction;
 use manifactor_quadric::{BoundingBox, Camera, DualQuadric};
-use manifactor_slam::record::SeenBox;
+use manifactor_slam::record::BoxRecord;
 use manifactor_slam::sequence::ObjectId;
 use nalgebra::{Matrix2, Matrix3, Point2, Rotation3, Vector3};
 
@@ -20,7 +20,7 @@ pub fn ellipsoid_and_box(width: f64) -> Option<Picture> {
     let quadric = DualQuadric { pose, semi_axes: Vector3::new(0.4, 0.16, 0.22) };
     let eye = looking_at(&Vector3::new(-0.3, -0.85, 0.7), &quadric.pose.translation);
     let whole = BoundingBox::new([0.0, 0.0, 640.0, 480.0]).ok()?;
-    let seen = SeenBox::new(ObjectId(0), whole, Some((&eye, &quadric)), &camera);
+    let seen = BoxRecord::new(ObjectId(0), whole, Some((&eye, &quadric)), &camera);
     let [xmin, ymin, xmax, ymax] = seen.projected?;
     // a detection with an error of some pixels
     let measured = [xmin - 14.0, ymin + 9.0, xmax + 8.0, ymax + 16.0];

@@ -34,8 +34,8 @@ pub fn experiment_pictures(
 }
 
 /// Draws the mean differences of a metric from the baseline, with their confidence intervals.
-fn differences(summary: &Summary, metric: &str, width: f64) -> Option<Picture> {
-    let mean = |group: &manifactor_slam::experiment::Group| {
+fn differences(summary: &ExperimentSummary, metric: &str, width: f64) -> Option<Picture> {
+    let mean = |group: &manifactor_slam::experiment::TrialGroup| {
         let comparison = group.comparisons.get(metric)?;
         let percent = 100.0 / comparison.baseline.abs();
         let difference = comparison.difference;

@@ -113,7 +113,7 @@ impl LiveMap {
         }
         let class = |key: &Key| {
             let measured = mapper.measurements().objects.iter().find(|object| object_key(object.id) == *key);
-            measured.and_then(Measured::class_name)
+            measured.and_then(ObjectMeasurements::class_name)
         };
         self.notes.take(report, |id| mapper.id_changes().current_id(id), class);
         let parked = report
