@@ -14,11 +14,11 @@ use nalgebra::{Matrix2, Matrix3, Point2, Rotation3, Vector3};
 /// Draws how an ellipsoid becomes a box: the ellipsoid and the camera at the left, its outline in the image and
 /// the box around the outline at the right. `None` if the ellipsoid is not in view.
 pub fn ellipsoid_and_box(width: f64) -> Option<Picture> {
-    let camera = Camera { fx: 320.0, fy: 320.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 };
+    let camera = Camera { fx: 620.0, fy: 620.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 };
     let turn = So3::exp(&Vector3::new(0.5, 0.1, 0.7));
     let pose = Se3 { rotation: turn, translation: Vector3::new(0.1, 0.05, 0.25) };
     let quadric = DualQuadric { pose, semi_axes: Vector3::new(0.4, 0.16, 0.22) };
-    let eye = looking_at(&Vector3::new(-0.3, -0.85, 0.7), &quadric.pose.translation);
+    let eye = looking_at(&Vector3::new(-0.5, -1.4, 0.85), &quadric.pose.translation);
     let whole = BoundingBox::new([0.0, 0.0, 640.0, 480.0]).ok()?;
     let seen = BoxRecord::new(ObjectId(0), whole, Some((&eye, &quadric)), &camera);
     let [xmin, ymin, xmax, ymax] = seen.projected?;
