@@ -29,6 +29,8 @@ pub enum Value {
     Bool(bool),
     /// An integer.
     Integer(i64),
+    /// A whole number above `i64::MAX`, as programs write it.
+    Unsigned(u64),
     /// Any other number. It may be infinite or NaN until it is read.
     Float(f64),
     /// A string.
@@ -98,6 +100,7 @@ impl Node {
             Value::Null => serde_json::Value::Null,
             Value::Bool(value) => (*value).into(),
             Value::Integer(value) => (*value).into(),
+            Value::Unsigned(value) => (*value).into(),
             Value::Float(value) => match serde_json::Number::from_f64(*value) {
                 Some(number) => number.into(),
                 None => {
@@ -149,6 +152,7 @@ impl Node {
             Value::Null => "nothing".into(),
             Value::Bool(value) => value.to_string(),
             Value::Integer(value) => format!("the number {value}"),
+            Value::Unsigned(value) => format!("the number {value}"),
             Value::Float(value) => format!("the number {value}"),
             Value::String(value) => format!("the text {:?}", cut(value)),
             Value::Array(_) => "an array".into(),
@@ -165,6 +169,7 @@ impl Serialize for Node {
             Value::Null => serializer.serialize_unit(),
             Value::Bool(value) => serializer.serialize_bool(*value),
             Value::Integer(value) => serializer.serialize_i64(*value),
+            Value::Unsigned(value) => serializer.serialize_u64(*value),
             Value::Float(value) => serializer.serialize_f64(*value),
             Value::String(value) => serializer.serialize_str(value),
             Value::Array(items) => serializer.collect_seq(items),
@@ -210,7 +215,7 @@ impl Node {
                 Ok(Value::Integer(value))
             }
             fn visit_u64<E: Error>(self, value: u64) -> Result<Value, E> {
-                Ok(i64::try_from(value).map_or(Value::Float(value as f64), Value::Integer))
+                Ok(i64::try_from(value).map_or(Value::Unsigned(value), Value::Integer))
             }
             fn visit_f64<E: Error>(self, value: f64) -> Result<Value, E> {
                 Ok(Value::Float(value))

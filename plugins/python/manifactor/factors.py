@@ -73,12 +73,13 @@ __all__ = [
 
 
 def accelerometer(*, measured: Numbers) -> Factor:
-    """A body at rest feels up where it is: r = R⁻¹ g - a, of length 2 sin(angle / 2).
+    """An accelerometer at rest measures the up direction: r = R⁻¹ g - a, of length 2 sin(angle / 2).
 
-    Variables: the pose of the body, with rotation R, and the direction g of up in the world. a is what the accelerometer measures,
-    the specific force, which points up at rest; its length does not matter. σ is in radians near alignment; a body that
-    accelerates by b is off by about b / 9.81. Turning the body about g, and moving it, leave it unchanged: it holds no yaw. Smooth
-    and defined everywhere; where a points straight down the derivative of the cost vanishes.
+    Variables: the pose of the body, with rotation R, and the up direction g in the world. a is the measured
+    specific force, which points up at rest; its length does not matter. σ is in radians close to alignment;
+    an acceleration b of the body causes an error of about b / 9.81. Invariant to rotating the body about g
+    and to moving it, so it does not constrain yaw. Smooth and defined everywhere; if a points straight down,
+    the derivative of the cost vanishes.
 
     ```toml
     [[factors]]
@@ -94,12 +95,12 @@ def accelerometer(*, measured: Numbers) -> Factor:
 
 
 def bearing_range_se2(*, bearing: float, range: float) -> Factor:
-    """The point is `range` away in the direction `bearing`, seen from the pose: r = (atan2(q) - β, ‖q‖ - d),
-    q = Rᵀ(p - t).
+    """A pose in the plane measures a point at the distance `range` in the direction `bearing`: r = (atan2(q) -
+    β, ‖q‖ - d), q = Rᵀ(p - t).
 
-    Two rows: the error of the bearing, wrapped to -π..π, in radians; that of the distance, in metres.
-    The bearing jumps where the point is opposite to where it was measured. Within a nanometre of the
-    pose there is no bearing: there the factor is not defined, and takes no part.
+    Two rows: the bearing residual in radians, wrapped to -π..π, and the range residual in metres. The bearing
+    residual jumps if the point is opposite to the measured direction. Not defined within a nanometre of the
+    pose, as there is no bearing; the factor is inactive there.
 
     ```toml
     [[factors]]
@@ -116,13 +117,13 @@ def bearing_range_se2(*, bearing: float, range: float) -> Factor:
 
 
 def bearing_range_se3(*, direction: Numbers, range: float) -> Factor:
-    """The point is `range` away in the direction `direction`, seen from the pose.
+    """A pose in space measures a point at the distance `range` in the direction `direction`.
 
-    Three rows: the arc from the measured direction to where the point is, in radians, along two axes
-    perpendicular to it; the error of the distance, in metres. With one σ for both rows of the arc it
-    does not matter which axes: the first is the one nearest to the pose's axis that is farthest from
-    the measured direction. Not defined within a nanometre of the pose, and where the point is exactly
-    opposite to where it was measured, within 1e-6 radians: there the arc has no direction.
+    Three rows: the arc from the measured direction to the direction of the point, in radians along two axes
+    perpendicular to the measured direction, and the range residual in metres. If both rows of the arc have an
+    equal σ, the choice of the axes does not matter. The first axis is as close as possible to the
+    coordinate axis of the pose that is farthest from the measured direction. Not defined within a nanometre of the pose, and
+    within 1e-6 radians of the opposite direction, as the arc has no direction there.
 
     ```toml
     [[factors]]
@@ -132,19 +133,19 @@ def bearing_range_se3(*, direction: Numbers, range: float) -> Factor:
     ```
 
     Args:
-        direction: Where the point was seen, in the frame of the pose; of any length but zero.
-        range: How far away, in metres.
+        direction: Measured direction in the frame of the pose, of any length but zero.
+        range: Measured distance, in metres.
     """
     return Factor("bearing_range_se3", {"direction": direction, "range": range})
 
 
 def beside(*, gap: float | None = None, up: Numbers | None = None) -> Factor:
-    """Two objects stand beside each other, so far apart: r = |h| - e₀ - e₁ - gap, in metres.
+    """Two objects stand side by side with a given gap: r = |h| - e₀ - e₁ - gap, in metres.
 
-    h is the way from the one centroid to the other, less its part along `up`; u = h/|h|, and eᵢ half the extent of object i
-    along u. It is unchanged where one goes round the other without turning relative to h, where either moves along `up`,
-    and where the two change places. Objects at one place, seen from above, have no direction between them: within a
-    micrometre of that it is not defined.
+    h is the vector between the two centroids without its component along `up`; u = h/|h|, and eᵢ is half the
+    extent of object i along u. Invariant to moving either object along `up`, to swapping the objects, and to
+    moving one around the other without rotation relative to h. If the centroids coincide when seen from
+    above, within a micrometre, there is no direction between them and the factor is not defined.
 
     ```toml
     [[factors]]
@@ -154,8 +155,8 @@ def beside(*, gap: float | None = None, up: Numbers | None = None) -> Factor:
     ```
 
     Args:
-        gap: How far they are apart, in metres. Default: 0, they touch.
-        up: The world's up, of any length but zero. Default: z.
+        gap: Gap between the objects, in metres. Default: 0, the objects touch.
+        up: The world's up direction, of any length but zero. Default: z.
     """
     return Factor("beside", {"gap": gap, "up": up})
 
@@ -292,26 +293,26 @@ def bounding_box(
     camera: types.Camera,
     model: Literal['standard', 'truncated'] | None = None,
 ) -> Factor:
-    """The box around an object's outline is the one that was drawn: r = β(x, q) - b, in pixels.
+    """A detector measures the box around an object's outline: r = β(x, q) - b, in pixels.
 
-    Variables: the pose of the camera (from the camera's frame, z forward, to the world's) and the
-    object. Rows: xmin, ymin, xmax, ymax. The sign is estimate minus measurement, as in all factors here;
-    Jablonsky et al. write b - β, which has the same square.
+    Variables: the pose of the camera (from the camera's frame, z forward, to the world frame) and the object.
+    Rows: xmin, ymin, xmax, ymax. The sign is estimate minus measurement, as in all factors of this library;
+    Jablonsky et al. use b - β, which gives an equal cost.
 
-    `model` says what β is. *standard*: the bounds of the whole ellipse C* = P Q* Pᵀ. *truncated*: the
-    bounds of what is inside of the image (Nicholson et al., QuadricSLAM), so that a box that the border
-    cuts does not pull. With the standard model, mask such sides: `noise = { sigma = 20.0, observed =
-    [false, true, true, true] }`.
+    `model` selects β. *standard*: the bounds of the whole ellipse C* = P Q* Pᵀ. *truncated*: the bounds of
+    the part inside the image (Nicholson et al., QuadricSLAM), so that a box cut by the border does not pull
+    the object. With the standard model, mask such sides: `noise = { sigma = 20.0, observed = [false, true,
+    true, true] }`.
 
-    Where it means something: the whole object is in front of the camera, by a millionth of its distance.
-    Behind the camera, around it (the camera inside) and across its plane the outline is no box, and the
-    factor is inactive; so is a truncated one of which less than a pixel is left in the image. An
-    inactive factor has residual zero.
+    Defined only if the whole object is in front of the camera, by a millionth of its distance. If it is
+    behind the camera, around it or across its plane, the outline is no box and the factor is inactive. With
+    the truncated model the factor is also inactive if less than a pixel of the outline is left in the image.
+    An inactive factor has residual zero.
 
-    Kinks: the bounds are smooth where the object is in front. A truncated side stops at the border: from
-    there on, the border included, its derivative is zero, so an object that fills the image is held by
-    nothing. Where the border cuts off the end of the ellipse, the side moves to the point where they
-    meet; its derivative has no jump there, but grows without limit as the last pixel leaves the image.
+    Kinks: the bounds are smooth while the object is in front. With the truncated model a side stops at the
+    border. From there on, including the border, its derivative is zero, so an object that fills the image is
+    not constrained. If the border cuts off the end of the ellipse, the side moves to the intersection of the
+    two. Its derivative does not jump there, but grows without limit as the last pixel leaves the image.
 
     ```toml
     [[factors]]
@@ -321,17 +322,19 @@ def bounding_box(
     ```
 
     Args:
-        box: The box that was measured: xmin, ymin, xmax, ymax, in pixels.
-        camera: The camera that saw it.
-        model: What of the object the box goes around. Default: "standard".
+        box: Measured box: xmin, ymin, xmax, ymax, in pixels.
+        camera: The calibrated camera.
+        model: Part of the object that the box encloses. Default: "standard".
     """
     return Factor("bounding_box", {"box": box, "camera": camera, "model": model})
 
 
 def centroid_depth(*, depth: float) -> Factor:
-    """An object's centre is at this depth: r = (Rᵀ(c - t))ᶻ - depth, c the centroid, R and t the camera's pose.
+    """A camera measures the depth of an object's centre: r = (Rᵀ(c - t))ᶻ - depth, c the centroid, R and t the
+    camera's pose.
 
-    The depth is along the optical axis, as depth images have it, in metres. It says nothing of the object's size. Defined everywhere.
+    The depth is along the optical axis, as in depth images, in metres. It does not constrain the object's
+    size. Defined everywhere.
 
     ```toml
     [[factors]]
@@ -341,7 +344,7 @@ def centroid_depth(*, depth: float) -> Factor:
     ```
 
     Args:
-        depth: In metres.
+        depth: Measured depth, in metres.
     """
     return Factor("centroid_depth", {"depth": depth})
 
@@ -383,11 +386,13 @@ def chordal_between_se3(*, relative: variables.Se3 | Fields) -> Factor:
 
 
 def collinear() -> Factor:
-    """The second of three objects is on the line through the other two: r = (c₁ - c₀) × u, u = (c₂ - c₀)/|c₂ - c₀|, in metres.
+    """The second of three objects is on the line through the other two: r = (c₁ - c₀) × u, u = (c₂ - c₀)/|c₂ -
+    c₀|, in metres.
 
-    Its length is the distance of the middle centroid from the line. Give the two that are furthest apart first and last. Moving
-    the second along the line, turning and growing leave it unchanged. Smooth wherever the outer two are apart; within a
-    micrometre they make no line, and it is not defined.
+    The length of r is the distance of the middle centroid from the line. Use the two objects that are
+    furthest apart as the first and the last key. Invariant to moving the second object along the line, and to
+    rotating and scaling any object. Smooth if the outer objects are apart; within a micrometre they do not
+    define a line, and the factor is not defined.
 
     ```toml
     [[factors]]
@@ -406,15 +411,15 @@ def conic_distance(
     camera: types.Camera,
     angle: float | None = None,
 ) -> Factor:
-    """The outline of an object is the ellipse that was measured: r = (μ - μ₀, A^½ U - A₀^½), in pixels.
+    """A detector measures the outline of an object as an ellipse: r = (μ - μ₀, A^½ U - A₀^½), in pixels.
 
-    Variables: the pose of the camera and the object. μ and A are centre and shape of the outline (x is inside where
-    (x - μ)ᵀA⁻¹(x - μ) ≤ 1), U the rotation that brings A^½ closest to A₀^½. So |r|² = |μ - μ₀|² + tr(A + A₀ - 2(A^½A₀A^½)^½): the square of
-    the 2-Wasserstein distance between the normal distributions whose 1-σ ellipses the two are (Gelbrich 1990), a distance that
-    changes smoothly as ellipses move, grow and turn, even where they do not overlap or are round. Rows: μ, then
-    the four entries of the difference by columns.
+    Variables: the pose of the camera and the object. μ and A are centre and shape of the outline (x is inside
+    if (x - μ)ᵀA⁻¹(x - μ) ≤ 1), U the rotation that brings A^½ closest to A₀^½. Then |r|² = |μ - μ₀|² + tr(A +
+    A₀ - 2(A^½A₀A^½)^½), the squared 2-Wasserstein distance between the normal distributions with these 1-σ
+    ellipses (Gelbrich 1990). It changes smoothly as ellipses move, scale and rotate, even if they are round
+    or do not overlap. Rows: μ, then the four entries of the difference by columns.
 
-    As `bounding_box`, it is defined where the whole object is in front of the camera; there it is smooth.
+    Like `bounding_box`, it is defined if the whole object is in front of the camera; there it is smooth.
 
     ```toml
     [[factors]]
@@ -424,20 +429,21 @@ def conic_distance(
     ```
 
     Args:
-        centre: The centre of the measured ellipse: right and down, in pixels.
-        semi_axes: Half its extents along its own axes, in pixels.
-        angle: The angle from the image's x axis (right) to the first semi-axis, towards y (down), in
-            radians. Default: 0.
-        camera: The camera that saw it.
+        centre: Centre of the measured ellipse, x right and y down, in pixels.
+        semi_axes: Semi-axes of the measured ellipse, in pixels.
+        angle: Angle from the image's x axis (right) to the first semi-axis, towards y (down), in radians.
+            Default: 0.
+        camera: The calibrated camera.
     """
     return Factor("conic_distance", {"centre": centre, "semi_axes": semi_axes, "camera": camera, "angle": angle})
 
 
 def constant_velocity(*, seconds: float) -> Factor:
-    """A body moves from one pose to the next with a velocity that stays the same: r = (Log(Xᵢ⁻¹ Xⱼ) − vᵢ Δt, vⱼ − vᵢ).
+    """A body moves between two poses with constant velocity: r = (Log(Xᵢ⁻¹ Xⱼ) − vᵢ Δt, vⱼ − vᵢ).
 
-    Velocities are in the frame of the body. The noise of white noise on the acceleration grows with Δt; see Anderson and Barfoot,
-    *Full STEAM Ahead*, 2015. Rows: the change of the pose (rad, m), then that of the velocity (rad/s, m/s).
+    Velocities are in the frame of the body. For white noise on the acceleration, the covariance grows with
+    Δt; see Anderson and Barfoot, *Full STEAM Ahead*, 2015. Rows: the residual of the pose (rad, m), then of
+    the velocity (rad/s, m/s).
 
     ```toml
     [[factors]]
@@ -477,148 +483,148 @@ def expression(
     Operators:
 
     ```text
-    number * number -> number     Product.
-    number * vector2 -> vector2   The vector, scaled.
-    number * vector3 -> vector3   The vector, scaled.
-    number * vector6 -> vector6   The vector, scaled.
-    se2 * vector2 -> vector2      The point p, given in the frame of x, in the outer one.
-    se2 * se2 -> se2              The pose y, given in the frame of x, in the outer one.
-    se3 * vector3 -> vector3      The point p, given in the frame of x, in the outer one.
-    se3 * se3 -> se3              The pose y, given in the frame of x, in the outer one.
-    so2 * vector2 -> vector2      The vector, turned.
-    so2 * so2 -> so2              One after the other, y first.
-    so3 * vector3 -> vector3      The vector, turned.
-    so3 * so3 -> so3              One after the other, y first.
-    vector2 * number -> vector2   The vector, scaled.
-    vector3 * number -> vector3   The vector, scaled.
-    vector6 * number -> vector6   The vector, scaled.
-    number + number -> number     Sum.
-    vector2 + vector2 -> vector2  Sum.
-    vector3 + vector3 -> vector3  Sum.
-    vector6 + vector6 -> vector6  Sum.
-    -number -> number             The other sign.
-    -vector2 -> vector2           The other way.
-    -vector3 -> vector3           The other way.
-    -vector6 -> vector6           The other way.
-    number - number -> number     Difference.
-    vector2 - vector2 -> vector2  Difference.
-    vector3 - vector3 -> vector3  Difference.
-    vector6 - vector6 -> vector6  Difference.
-    number / number -> number     Quotient.
-    vector2 / number -> vector2   The vector, divided by a number.
-    vector3 / number -> vector3   The vector, divided by a number.
-    vector6 / number -> vector6   The vector, divided by a number.
-    number ^ number -> number     A power; the exponent has to be constant.
+    number * number -> number     The product.
+    number * vector2 -> vector2   The scaled vector.
+    number * vector3 -> vector3   The scaled vector.
+    number * vector6 -> vector6   The scaled vector.
+    se2 * vector2 -> vector2      The point p, given in the frame of x, in the outer frame.
+    se2 * se2 -> se2              The pose y, given in the frame of x, in the outer frame.
+    se3 * vector3 -> vector3      The point p, given in the frame of x, in the outer frame.
+    se3 * se3 -> se3              The pose y, given in the frame of x, in the outer frame.
+    so2 * vector2 -> vector2      The rotated vector.
+    so2 * so2 -> so2              The composition of two rotations; y is applied first.
+    so3 * vector3 -> vector3      The rotated vector.
+    so3 * so3 -> so3              The composition of two rotations; y is applied first.
+    vector2 * number -> vector2   The scaled vector.
+    vector3 * number -> vector3   The scaled vector.
+    vector6 * number -> vector6   The scaled vector.
+    number + number -> number     The sum.
+    vector2 + vector2 -> vector2  The sum.
+    vector3 + vector3 -> vector3  The sum.
+    vector6 + vector6 -> vector6  The sum.
+    -number -> number             The negative.
+    -vector2 -> vector2           The vector in the opposite direction.
+    -vector3 -> vector3           The vector in the opposite direction.
+    -vector6 -> vector6           The vector in the opposite direction.
+    number - number -> number     The difference.
+    vector2 - vector2 -> vector2  The difference.
+    vector3 - vector3 -> vector3  The difference.
+    vector6 - vector6 -> vector6  The difference.
+    number / number -> number     The quotient.
+    vector2 / number -> vector2   The vector divided by a number.
+    vector3 / number -> vector3   The vector divided by a number.
+    vector6 / number -> vector6   The vector divided by a number.
+    number ^ number -> number     The power; the exponent must be constant.
     ```
 
     Functions:
 
     ```text
-    abs(a: number) -> number                                    The absolute value. At zero it has a kink; the derivative taken there is that of a > 0.
+    abs(a: number) -> number                                    The absolute value. It has a kink at zero; the derivative for a > 0 is used there.
     abs(v: vector3) -> vector3                                  The absolute value of each component.
-    acos(a: number) -> number                                   The angle of a cosine, in radians. Its derivative at ±1 is infinite: `angle(a, b)` has no such place but 0 and π.
+    acos(a: number) -> number                                   The arccosine, in radians. Its derivative at ±1 is infinite; `angle(a, b)` has kinks only at 0 and π.
     angle(x: so2) -> number                                     The angle within -π..π, in radians.
     angle(a: vector2, b: vector2) -> number                     The angle from a to b, counter-clockwise, within -π..π.
-    angle(a: vector3, b: vector3) -> number                     The angle between two vectors, 0 to π. At both ends it has a kink; the derivative taken there is zero.
-    asin(a: number) -> number                                   The angle of a sine, in radians. Its derivative at ±1 is infinite.
-    atan(a: number) -> number                                   The angle of a tangent, in radians.
+    angle(a: vector3, b: vector3) -> number                     The angle between two vectors, 0 to π. It has a kink at both ends; the derivative returned there is zero.
+    asin(a: number) -> number                                   The arcsine, in radians. Its derivative at ±1 is infinite.
+    atan(a: number) -> number                                   The arctangent, in radians.
     atan2(y: number, x: number) -> number                       The angle of the vector (x, y) within -π..π, in radians.
-    between(x: se2, y: se2) -> se2                              The pose y, seen from x: x⁻¹y.
-    between(x: se3, y: se3) -> se3                              The pose y, seen from x: x⁻¹y.
-    between(x: so2, y: so2) -> so2                              How y is turned, seen from x: x⁻¹y.
-    between(x: so3, y: so3) -> so3                              How y is turned, seen from x: x⁻¹y.
+    between(x: se2, y: se2) -> se2                              The pose y in the frame of x: x⁻¹y.
+    between(x: se3, y: se3) -> se3                              The pose y in the frame of x: x⁻¹y.
+    between(x: so2, y: so2) -> so2                              The rotation y in the frame of x: x⁻¹y.
+    between(x: so3, y: so3) -> so3                              The rotation y in the frame of x: x⁻¹y.
     centroid(q: dual_quadric) -> vector3                        The centre of an object.
     cos(a: number) -> number                                    The cosine of an angle in radians.
-    cross(a: vector2, b: vector2) -> number                     The area between two vectors, with its sign.
-    cross(a: vector3, b: vector3) -> vector3                    The vector product.
-    distance(a: vector2, b: vector2) -> number                  How far apart two points are. Where they meet, its derivative is taken as zero.
-    distance(a: vector3, b: vector3) -> number                  How far apart two points are. Where they meet, its derivative is taken as zero.
-    distance(a: vector6, b: vector6) -> number                  How far apart two points are. Where they meet, its derivative is taken as zero.
-    divide(a: vector2, b: vector2) -> vector2                   Component by component.
-    divide(a: vector3, b: vector3) -> vector3                   Component by component.
-    divide(a: vector6, b: vector6) -> vector6                   Component by component.
+    cross(a: vector2, b: vector2) -> number                     The signed area of the parallelogram between two vectors.
+    cross(a: vector3, b: vector3) -> vector3                    The cross product.
+    distance(a: vector2, b: vector2) -> number                  The distance between two points. If they coincide, the derivative returned is zero.
+    distance(a: vector3, b: vector3) -> number                  The distance between two points. If they coincide, the derivative returned is zero.
+    distance(a: vector6, b: vector6) -> number                  The distance between two points. If they coincide, the derivative returned is zero.
+    divide(a: vector2, b: vector2) -> vector2                   The componentwise quotient.
+    divide(a: vector3, b: vector3) -> vector3                   The componentwise quotient.
+    divide(a: vector6, b: vector6) -> vector6                   The componentwise quotient.
     dot(a: vector2, b: vector2) -> number                       The scalar product.
     dot(a: vector3, b: vector3) -> number                       The scalar product.
     dot(a: vector6, b: vector6) -> number                       The scalar product.
-    exp(a: number) -> number                                    The exponential.
-    extent(q: dual_quadric, u: vector3) -> number               Half the extent of an object along a unit vector u, √Σ (sₖ Rₖ · u)²: so far above its lowest point is its centre.
-    height(plane: plane, p: vector3) -> number                  How far a point is above a plane, along its normal.
-    inverse(x: se2) -> se2                                      The outer frame, seen from x: `inverse(x) * p` is a point, seen from x.
-    inverse(x: se3) -> se3                                      The outer frame, seen from x: `inverse(x) * p` is a point, seen from x.
-    inverse(x: so2) -> so2                                      The rotation back.
-    inverse(x: so3) -> so3                                      The rotation back.
-    largest(v: vector2) -> number                               The greatest component, the first of equals.
-    largest(v: vector3) -> number                               The greatest component, the first of equals.
-    largest(v: vector6) -> number                               The greatest component, the first of equals.
+    exp(a: number) -> number                                    The exponential function.
+    extent(q: dual_quadric, u: vector3) -> number               Half the extent of an object along a unit vector u, √Σ (sₖ Rₖ · u)². The centre is this far above the lowest point.
+    height(plane: plane, p: vector3) -> number                  The height of a point above a plane, along its normal.
+    inverse(x: se2) -> se2                                      The inverse pose: `inverse(x) * p` is the point p in the frame of x.
+    inverse(x: se3) -> se3                                      The inverse pose: `inverse(x) * p` is the point p in the frame of x.
+    inverse(x: so2) -> so2                                      The inverse rotation.
+    inverse(x: so3) -> so3                                      The inverse rotation.
+    largest(v: vector2) -> number                               The largest component, the first of equal ones.
+    largest(v: vector3) -> number                               The largest component, the first of equal ones.
+    largest(v: vector6) -> number                               The largest component, the first of equal ones.
     ln(a: number) -> number                                     The natural logarithm.
     ln(v: vector3) -> vector3                                   The logarithm of each component.
-    log(x: se2) -> vector3                                      The tangent vector (v, θ) that leads from the outer frame to the pose.
-    log(x: se3) -> vector6                                      The tangent vector (ω, v) that leads from the outer frame to the pose.
-    log(x: so3) -> vector3                                      The rotation vector, shorter than half a turn, in radians.
-    major_axis(q: dual_quadric) -> vector3                      The direction of the longest semi-axis, the first of equals; its sign means nothing.
-    max(a: number, b: number) -> number                         The greater of two, the first of equals.
-    min(a: number, b: number) -> number                         The lesser of two, the first of equals.
-    multiply(a: vector2, b: vector2) -> vector2                 Component by component.
-    multiply(a: vector3, b: vector3) -> vector3                 Component by component.
-    multiply(a: vector6, b: vector6) -> vector6                 Component by component.
-    norm(v: vector2) -> number                                  The length. At zero it has a kink; the derivative taken there is zero.
-    norm(v: vector3) -> number                                  The length. At zero it has a kink; the derivative taken there is zero.
-    norm(v: vector6) -> number                                  The length. At zero it has a kink; the derivative taken there is zero.
-    norm_squared(v: vector2) -> number                          The sum of the squares.
-    norm_squared(v: vector3) -> number                          The sum of the squares.
-    norm_squared(v: vector6) -> number                          The sum of the squares.
-    normal(plane: plane) -> vector3                             The normal of a plane, a unit vector.
-    offset(plane: plane) -> number                              How far a plane is from the origin along its normal.
-    pose(q: dual_quadric) -> se3                                The pose of an object, from its own frame to the outer one.
-    pose(rotation: so2, position: vector2) -> se2               The pose of that rotation, there.
-    pose(rotation: so3, position: vector3) -> se3               The pose of that rotation, there.
-    position(x: se2) -> vector2                                 Where a pose is.
-    position(x: se3) -> vector3                                 Where a pose is.
-    project(v: vector3) -> vector2                              Where a point is seen, in the frame of a camera that looks along z: (x, y)/z.
-    rotation(q: dual_quadric) -> so3                            Which way an object is turned.
-    rotation(angle: number) -> so2                              The rotation by an angle in radians, counter-clockwise.
-    rotation(x: se2) -> so2                                     Which way a pose is turned.
-    rotation(x: se3) -> so3                                     Which way a pose is turned.
-    rotation(omega: vector3) -> so3                             The rotation about a vector by its length, in radians.
-    semi_axes(q: dual_quadric) -> vector3                       Half the extents of an object along its own axes.
+    log(x: se2) -> vector3                                      The tangent vector (v, θ) from the identity to the pose.
+    log(x: se3) -> vector6                                      The tangent vector (ω, v) from the identity to the pose.
+    log(x: so3) -> vector3                                      The shortest rotation vector, of length π at most, in radians.
+    major_axis(q: dual_quadric) -> vector3                      The unit direction of the longest semi-axis, the first of equal ones. Its sign is arbitrary.
+    max(a: number, b: number) -> number                         The larger of two numbers, the first if they are equal.
+    min(a: number, b: number) -> number                         The smaller of two numbers, the first if they are equal.
+    multiply(a: vector2, b: vector2) -> vector2                 The componentwise product.
+    multiply(a: vector3, b: vector3) -> vector3                 The componentwise product.
+    multiply(a: vector6, b: vector6) -> vector6                 The componentwise product.
+    norm(v: vector2) -> number                                  The length. It has a kink at zero; the derivative returned there is zero.
+    norm(v: vector3) -> number                                  The length. It has a kink at zero; the derivative returned there is zero.
+    norm(v: vector6) -> number                                  The length. It has a kink at zero; the derivative returned there is zero.
+    norm_squared(v: vector2) -> number                          The squared length.
+    norm_squared(v: vector3) -> number                          The squared length.
+    norm_squared(v: vector6) -> number                          The squared length.
+    normal(plane: plane) -> vector3                             The unit normal of a plane.
+    offset(plane: plane) -> number                              The distance of a plane from the origin along its normal.
+    pose(q: dual_quadric) -> se3                                The pose of an object, from its local frame to the outer one.
+    pose(rotation: so2, position: vector2) -> se2               The pose with this rotation and this position.
+    pose(rotation: so3, position: vector3) -> se3               The pose with this rotation and this position.
+    position(x: se2) -> vector2                                 The position of a pose.
+    position(x: se3) -> vector3                                 The position of a pose.
+    project(v: vector3) -> vector2                              The projection (x, y)/z of a point in the frame of a camera that looks along z.
+    rotation(q: dual_quadric) -> so3                            The rotation of an object.
+    rotation(angle: number) -> so2                              The rotation by `angle`, in radians, counter-clockwise.
+    rotation(x: se2) -> so2                                     The rotation of a pose.
+    rotation(x: se3) -> so3                                     The rotation of a pose.
+    rotation(omega: vector3) -> so3                             The rotation about the vector `omega` by its length, in radians.
+    semi_axes(q: dual_quadric) -> vector3                       Half the extents of an object along its principal axes.
     sin(a: number) -> number                                    The sine of an angle in radians.
-    smallest(v: vector2) -> number                              The least component, the first of equals.
-    smallest(v: vector3) -> number                              The least component, the first of equals.
-    smallest(v: vector6) -> number                              The least component, the first of equals.
+    smallest(v: vector2) -> number                              The smallest component, the first of equal ones.
+    smallest(v: vector3) -> number                              The smallest component, the first of equal ones.
+    smallest(v: vector6) -> number                              The smallest component, the first of equal ones.
     sqrt(a: number) -> number                                   The square root. Its derivative at zero is infinite.
     sum(v: vector2) -> number                                   The sum of the components.
     sum(v: vector3) -> number                                   The sum of the components.
     sum(v: vector6) -> number                                   The sum of the components.
     tan(a: number) -> number                                    The tangent of an angle in radians.
-    unit(v: vector2) -> vector2                                 The vector, one long.
-    unit(v: vector3) -> vector3                                 The vector, one long.
-    unit(v: vector6) -> vector6                                 The vector, one long.
-    vector(x: number, y: number) -> vector2                     The vector of these; `[x, y]` is short for it.
-    vector(x: number, y: number, z: number) -> vector3          The vector of these; `[x, y, z]` is short for it.
-    where(positive: number, a: number, b: number) -> number     A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
-    where(positive: number, a: vector2, b: vector2) -> vector2  A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
-    where(positive: number, a: vector3, b: vector3) -> vector3  A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
-    where(positive: number, a: vector6, b: vector6) -> vector6  A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
-    wrap(angle: number) -> number                               The same angle within -π..π, in radians.
+    unit(v: vector2) -> vector2                                 The vector, normalized to length one.
+    unit(v: vector3) -> vector3                                 The vector, normalized to length one.
+    unit(v: vector6) -> vector6                                 The vector, normalized to length one.
+    vector(x: number, y: number) -> vector2                     The vector of two components; `[x, y]` is short for it.
+    vector(x: number, y: number, z: number) -> vector3          The vector of three components; `[x, y, z]` is short for it.
+    where(positive: number, a: number, b: number) -> number     A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected branch.
+    where(positive: number, a: vector2, b: vector2) -> vector2  A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected branch.
+    where(positive: number, a: vector3, b: vector3) -> vector3  A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected branch.
+    where(positive: number, a: vector6, b: vector6) -> vector6  A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected branch.
+    wrap(angle: number) -> number                               The angle wrapped to -π..π, in radians.
     x(v: vector2) -> number                                     The first component.
     x(v: vector3) -> number                                     The first component.
-    x_axis(x: so2) -> vector2                                   The x axis, turned.
-    x_axis(x: so3) -> vector3                                   The x axis, turned.
+    x_axis(x: so2) -> vector2                                   The x axis of the rotated frame.
+    x_axis(x: so3) -> vector3                                   The x axis of the rotated frame.
     y(v: vector2) -> number                                     The second component.
     y(v: vector3) -> number                                     The second component.
-    y_axis(x: so2) -> vector2                                   The y axis, turned.
-    y_axis(x: so3) -> vector3                                   The y axis, turned.
+    y_axis(x: so2) -> vector2                                   The y axis of the rotated frame.
+    y_axis(x: so3) -> vector3                                   The y axis of the rotated frame.
     z(v: vector3) -> number                                     The third component.
-    z_axis(x: so3) -> vector3                                   The z axis, turned.
+    z_axis(x: so3) -> vector3                                   The z axis of the rotated frame.
     ```
 
     Args:
-        variables: Names of the variables, in the order of the factor's keys, and the type of each.
-        residual: Formulas, each a row or, where it is a vector, several.
-        define: Parts of formulas by name, for all formulas and for the parts behind them.
-        constants: Numbers, vectors and other values that formulas use by name.
-        up: The world's up, of any length but zero. Default: z.
-        domain: Formulas that are above zero wherever the factor means something.
+        variables: Names of the variables, in the order of the factor's keys, with the type of each.
+        residual: Formulas of the residual. Each gives one row, or several if it is a vector.
+        define: Named parts of formulas, usable in all formulas and in later parts.
+        constants: Numbers, vectors and other values that formulas refer to by name.
+        up: The world's up direction, of any length but zero. Default: z.
+        domain: Formulas that must be positive for the factor to be defined.
     """
     return Factor("expression", {"variables": variables, "residual": residual, "define": define, "constants": constants, "up": up, "domain": domain})
 
@@ -626,10 +632,10 @@ def expression(
 def horizontal_orientation(*, up: Numbers | None = None) -> Factor:
     """The major semi-axis m of an object is horizontal: r = 0 - |m · up|   (Jablonsky et al., eq. 7).
 
-    Turning about `up`, about m, moving and growing leave it unchanged. Where m is exactly horizontal,
-    |·| has a kink, its square has none: the derivative taken there is that of m · up > 0, and it is
-    not zero. Where m is vertical, the derivative vanishes. m is the longest semi-axis at the current
-    estimate, the first of equals: where another becomes the longest, the residual jumps. It is defined
+    Invariant to rotation about `up` and about m, to moving and to scaling. If m is exactly horizontal,
+    |·| has a kink, but its square has none. The derivative for m · up > 0 is used there, and it is not
+    zero. If m is vertical, the derivative vanishes. m is the longest semi-axis at the current estimate,
+    the first of equal ones. If a different axis becomes the longest, the residual jumps. Defined
     everywhere.
 
     ```toml
@@ -640,7 +646,7 @@ def horizontal_orientation(*, up: Numbers | None = None) -> Factor:
     ```
 
     Args:
-        up: The world's up, of any length but zero. Default: z.
+        up: The world's up direction, of any length but zero. Default: z.
     """
     return Factor("horizontal_orientation", {"up": up})
 
@@ -648,9 +654,9 @@ def horizontal_orientation(*, up: Numbers | None = None) -> Factor:
 def horizontal_orientation_smooth(*, up: Numbers | None = None) -> Factor:
     """The major semi-axis m of an object is horizontal: r = m · up, the sine of its elevation.
 
-    `horizontal_orientation` without the absolute value: its square is the same, the sign of m does not
-    matter, and the residual has no kink. σ is in radians, near the horizontal. The jump between axes of
-    equal length is the same.
+    `horizontal_orientation` without the absolute value: the cost is equal, the sign of m does not matter,
+    and the residual has no kink. σ is in radians, close to the horizontal. The jump between axes of equal
+    length is as in `horizontal_orientation`.
 
     ```toml
     [[factors]]
@@ -660,7 +666,7 @@ def horizontal_orientation_smooth(*, up: Numbers | None = None) -> Factor:
     ```
 
     Args:
-        up: The world's up, of any length but zero. Default: z.
+        up: The world's up direction, of any length but zero. Default: z.
     """
     return Factor("horizontal_orientation_smooth", {"up": up})
 
@@ -678,7 +684,7 @@ def landmark_se2(*, position: Numbers) -> Factor:
     ```
 
     Args:
-        position: Where the point is, in metres, in the frame of the pose.
+        position: Measured position of the point in the frame of the pose, in metres.
     """
     return Factor("landmark_se2", {"position": position})
 
@@ -696,24 +702,27 @@ def landmark_se3(*, position: Numbers) -> Factor:
     ```
 
     Args:
-        position: Where the point is, in metres, in the frame of the pose.
+        position: Measured position of the point in the frame of the pose, in metres.
     """
     return Factor("landmark_se3", {"position": position})
 
 
 def max_mixture(*, components: Sequence[types.Component]) -> Factor:
-    """The factor that fits best, of several: ½|r|² = minₖ ½|Wₖ rₖ|² + ln(w_max / wₖ)   (Olson and Agarwal 2013).
+    """The best of several factors: ½|r|² = minₖ ½|Wₖ rₖ|² + ln(w_max / wₖ)   (Olson and Agarwal 2013).
 
-    A detection that may be a chair or a box brings the factors of both, weighted by the detector's scores; the estimate
-    decides, and decides again at each step. A component without a factor means none of them, at a price: an outlier. wₖ is the factor before
-    exp(-½|Wₖ rₖ|²), so components of different dimensions are compared by what they cost, not by how narrow they are. Rows: √(2 ln(w_max/wₖ)),
-    then the whitened rows of the component; zeros, where it has fewer than another.
+    A detection that may be a chair or a box adds the factors of both, weighted by the detector's scores. The
+    solver selects the best component again at each step. A component without a factor is the null hypothesis,
+    an outlier, at a fixed cost. wₖ is the weight in front of exp(-½|Wₖ rₖ|²), so components of different
+    dimensions are compared by their cost, not by their sigmas. Rows: √(2 ln(w_max/wₖ)), then the whitened
+    rows of the component, padded with zeros to the longest component.
 
-    Components may be over different variables: `over` says which of the mixture's, as a box may show the one object or the other.
+    Components may use different variables: `over` lists the variables of the mixture that a component uses.
+    An example is a box that may show either of two objects.
 
-    The cost is continuous; where the best component changes, the rows jump. A component that is not defined takes no
-    part; where none is, the mixture is not defined. It has noise of its own in each component: leave out `noise` beside it.
-    Evaluating allocates a little for each component: it is for priors on objects, and for some boxes, not for each measurement.
+    The cost is continuous; the rows jump when a different component becomes the best. A component that is not
+    defined is skipped; if none is defined, the mixture is not defined. Each component has a noise model, so
+    omit `noise` next to the mixture. Each evaluation allocates some memory per component. Use mixtures for
+    priors on objects and for ambiguous boxes, not for every measurement.
 
     ```toml
     [[factors]]
@@ -728,7 +737,7 @@ def max_mixture(*, components: Sequence[types.Component]) -> Factor:
     ]
     ```
 
-    A box from x0 that shows q0, or q1 half as likely:
+    A box from x0 that shows either q0 or, half as likely, q1:
 
     ```toml
     [[factors]]
@@ -743,18 +752,20 @@ def max_mixture(*, components: Sequence[types.Component]) -> Factor:
     ```
 
     Args:
-        components: What it may be: two or more.
+        components: Alternatives: two or more.
     """
     return Factor("max_mixture", {"components": components})
 
 
 def on_object(*, up: Numbers | None = None) -> Factor:
-    """The lowest point of an object is as high as the highest point of another: r = (c₁ - c₀) · up - e₁ - e₀, in metres.
+    """The lowest point of an object is as high as the highest point of another: r = (c₁ - c₀) · up - e₁ - e₀, in
+    metres.
 
-    Variables: the object on top (1), and the one that carries it (0). eᵢ is half the extent along `up`, as in
-    `supporting_plane`. The two need not be above each other: that is for a box, or for a prior, to say. Moving either
-    of them sideways and turning it about `up` leave it unchanged. The top of an ellipsoid is a point: right for what stands
-    on a flat top only as far as the ellipsoid's height is that of the thing. Smooth and defined everywhere.
+    Variables: the object on top (1), and the object that carries it (0). eᵢ is half the extent along `up`, as
+    in `supporting_plane`. The two need not be above each other; a box or a prior has to constrain that.
+    Invariant to moving either object sideways and to rotating it about `up`. The top of an ellipsoid is a
+    point, so the model fits an object with a flat top only if the ellipsoid is as high as the object. Smooth
+    and defined everywhere.
 
     ```toml
     [[factors]]
@@ -764,7 +775,7 @@ def on_object(*, up: Numbers | None = None) -> Factor:
     ```
 
     Args:
-        up: The world's up, of any length but zero. Default: z.
+        up: The world's up direction, of any length but zero. Default: z.
     """
     return Factor("on_object", {"up": up})
 
@@ -772,10 +783,10 @@ def on_object(*, up: Numbers | None = None) -> Factor:
 def parallel(*, axes: Sequence[Literal['longest', 'shortest', 'x', 'y', 'z']] | None = None) -> Factor:
     """An axis of an object is parallel to an axis of another: r = a₀ × a₁, of length sin(angle).
 
-    Which way the axes point does not matter. σ is in radians, near alignment. Moving either of them, and turning both
-    together, leave it unchanged, and so does turning either about its axis. Smooth, except that `longest` and `shortest` jump where
-    another axis takes the place; perpendicular axes are a maximum, where the derivative of the cost vanishes. Defined
-    everywhere.
+    The signs of the axes do not matter. σ is in radians, close to alignment. Invariant to moving either
+    object, to rotating both together, and to rotating either about its axis. Smooth, except that `longest`
+    and `shortest` jump if a different axis becomes the longest or the shortest. Perpendicular axes are a
+    maximum, at which the derivative of the cost vanishes. Defined everywhere.
 
     ```toml
     [[factors]]
@@ -785,19 +796,20 @@ def parallel(*, axes: Sequence[Literal['longest', 'shortest', 'x', 'y', 'z']] | 
     ```
 
     Args:
-        axes: The axis of each: longest, shortest, x, y or z. Default: the longest of both.
+        axes: The axis of each object: longest, shortest, x, y or z. Default: the longest of both.
     """
     return Factor("parallel", {"axes": axes})
 
 
 def point_inside(*, point: Numbers, surface: bool | None = None) -> Factor:
-    """A measured point belongs to an object: r = max(0, ρ - 1), with ρ = ‖S⁻¹Rᵀ(X p - c)‖ its distance in semi-axes.
+    """A measured point belongs to an object: r = max(0, ρ - 1), with ρ = ‖S⁻¹Rᵀ(X p - c)‖ its distance in
+    semi-axes.
 
-    Variables: the pose X of the depth camera or lidar that measured the point p, and the object. Inside (ρ < 1) it costs nothing
-    and pulls nothing; outside, σ = 0.1 allows for a tenth of the object's size. Points alone let an object grow without
-    end: give it a size prior, or its boxes. With `surface = true` the point is on the surface, r = ρ - 1 on both sides.
-    The hinge has a kink at the surface, its square has none. At the centre ρ has no derivative: with `surface`, it is not
-    defined within 1e-6 of it.
+    Variables: the pose X of the depth camera or lidar that measured the point p, and the object. Inside the
+    object (ρ < 1) residual and derivative are zero. Outside it, σ = 0.1 allows for a tenth of the object's
+    size. Points alone let an object grow without limit: add a size prior or boxes. With `surface = true` the
+    point is on the surface, r = ρ - 1 on both sides. The hinge has a kink at the surface, but its square has
+    none. At the centre ρ has no derivative: with `surface`, the factor is not defined for ρ below 1e-6.
 
     ```toml
     [[factors]]
@@ -826,9 +838,9 @@ def position_se2(*, position: Numbers, lever_arm: Numbers | None = None) -> Fact
     ```
 
     Args:
-        position: Where the antenna is, in metres, in the outer frame.
-        lever_arm: Where the antenna is mounted, in metres, in the frame of the pose; its origin, if not
-            given.
+        position: Measured position of the antenna in the outer frame, in metres.
+        lever_arm: Position of the antenna in the frame of the pose, in metres. Default: the origin of
+            that frame.
     """
     return Factor("position_se2", {"position": position, "lever_arm": lever_arm})
 
@@ -846,18 +858,19 @@ def position_se3(*, position: Numbers, lever_arm: Numbers | None = None) -> Fact
     ```
 
     Args:
-        position: Where the antenna is, in metres, in the outer frame.
-        lever_arm: Where the antenna is mounted, in metres, in the frame of the pose; its origin, if not
-            given.
+        position: Measured position of the antenna in the outer frame, in metres.
+        lever_arm: Position of the antenna in the frame of the pose, in metres. Default: the origin of
+            that frame.
     """
     return Factor("position_se3", {"position": position, "lever_arm": lever_arm})
 
 
 def prior_plane(*, value: variables.Plane | Fields) -> Factor:
-    """A plane is known beforehand: r = (n - n₀, offset - offset₀), in radians and metres.
+    """A prior on a plane: r = (n - n₀, offset - offset₀), in radians and metres.
 
-    Four rows: the difference of the unit normals, of length 2 sin(θ/2) for an angle θ, and the distance. The plane turned over
-    is another plane: its cost is the maximum, and the derivative vanishes there. Smooth and defined everywhere.
+    Four rows: the difference of the unit normals, of length 2 sin(θ/2) for an angle θ, and the difference of
+    the offsets. A plane with the opposite normal is a different plane: the cost has its maximum there, and
+    its derivative vanishes. Smooth and defined everywhere.
 
     ```toml
     [[factors]]
@@ -867,7 +880,7 @@ def prior_plane(*, value: variables.Plane | Fields) -> Factor:
     ```
 
     Args:
-        value: The plane that is expected.
+        value: Expected plane.
     """
     return Factor("prior_plane", {"value": untagged(value)})
 
@@ -885,7 +898,7 @@ def prior_point1(*, value: variables.Point1 | Fields) -> Factor:
     ```
 
     Args:
-        value: Where the variable is expected.
+        value: Expected value of the variable.
     """
     return Factor("prior_point1", {"value": untagged(value)})
 
@@ -903,7 +916,7 @@ def prior_point2(*, value: variables.Point2 | Fields) -> Factor:
     ```
 
     Args:
-        value: Where the variable is expected.
+        value: Expected value of the variable.
     """
     return Factor("prior_point2", {"value": untagged(value)})
 
@@ -921,18 +934,18 @@ def prior_point3(*, value: variables.Point3 | Fields) -> Factor:
     ```
 
     Args:
-        value: Where the variable is expected.
+        value: Expected value of the variable.
     """
     return Factor("prior_point3", {"value": untagged(value)})
 
 
 def prior_quadric(*, value: variables.DualQuadric | Fields) -> Factor:
-    """An object is close to `value`: r = (Log(Z⁻¹X), log(s/s₀)), pose first.
+    """A prior: the object is close to `value`: r = (Log(Z⁻¹X), log(s/s₀)), pose first.
 
-    Rows: rotation in radians, translation in metres, both in the prior's frame, then the logarithms of
-    the semi-axes, axis by axis: 0.1 is 10 % of size. To say something of the pose only, or of the size
-    only, mask the other rows by `observed`. Two rotations half a turn apart have two shortest ways
-    between them: there the residual jumps, though half a turn about an axis leaves the ellipsoid as it is.
+    Rows: rotation in radians and translation in metres, both in the prior's frame, then the logarithms of the
+    semi-axes, axis by axis: 0.1 is 10 % of size. To constrain only the pose or only the size, mask the
+    remaining rows with `observed`. Two rotations half a turn apart have two shortest paths between them, so
+    the residual jumps there, although half a turn about an axis leaves the ellipsoid unchanged.
 
     ```toml
     [[factors]]
@@ -942,7 +955,7 @@ def prior_quadric(*, value: variables.DualQuadric | Fields) -> Factor:
     ```
 
     Args:
-        value: What the object is expected to be.
+        value: Expected pose and semi-axes of the object.
     """
     return Factor("prior_quadric", {"value": untagged(value)})
 
@@ -960,7 +973,7 @@ def prior_se2(*, value: variables.Se2 | Fields) -> Factor:
     ```
 
     Args:
-        value: Where the variable is expected.
+        value: Expected value of the variable.
     """
     return Factor("prior_se2", {"value": untagged(value)})
 
@@ -978,7 +991,7 @@ def prior_se3(*, value: variables.Se3 | Fields) -> Factor:
     ```
 
     Args:
-        value: Where the variable is expected.
+        value: Expected value of the variable.
     """
     return Factor("prior_se3", {"value": untagged(value)})
 
@@ -996,7 +1009,7 @@ def prior_so2(*, value: variables.So2 | Fields) -> Factor:
     ```
 
     Args:
-        value: Where the variable is expected.
+        value: Expected value of the variable.
     """
     return Factor("prior_so2", {"value": untagged(value)})
 
@@ -1014,7 +1027,7 @@ def prior_so3(*, value: variables.So3 | Fields) -> Factor:
     ```
 
     Args:
-        value: Where the variable is expected.
+        value: Expected value of the variable.
     """
     return Factor("prior_so3", {"value": untagged(value)})
 
@@ -1032,7 +1045,7 @@ def prior_twist(*, value: variables.Twist | Fields) -> Factor:
     ```
 
     Args:
-        value: Where the variable is expected.
+        value: Expected value of the variable.
     """
     return Factor("prior_twist", {"value": untagged(value)})
 
@@ -1050,18 +1063,19 @@ def projection(*, pixel: Numbers, camera: types.Camera) -> Factor:
     ```
 
     Args:
-        pixel: Pixel of the point, x right and y down.
-        camera: The camera that saw it.
+        pixel: Measured pixel, x right and y down.
+        camera: The calibrated camera.
     """
     return Factor("projection", {"pixel": pixel, "camera": camera})
 
 
 def projection_bal(*, pixel: Numbers) -> Factor:
-    """The point is seen at `pixel` by a camera with radial distortion: r = f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p - z, in pixels.
+    """A camera with radial distortion measures a point at `pixel`: r = f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p - z, in
+    pixels.
 
-    With p = -(Px, Py) / Pz and P = Rᵀ(X - t) the point in the camera's frame, which looks along -z. Rows: x to the
-    right and y up, from the image's centre. Not defined where the point is not in front of the camera by a
-    millionth of its distance; the factor is inactive there.
+    Here p = -(Px, Py) / Pz, and P = Rᵀ(X - t) is the point in the camera's frame; the camera looks along -z.
+    Rows: x to the right and y up, from the image centre. Not defined unless the point is in front of the
+    camera, with a depth of more than a millionth of its distance; otherwise the factor is inactive.
 
     ```toml
     [[factors]]
@@ -1071,7 +1085,7 @@ def projection_bal(*, pixel: Numbers) -> Factor:
     ```
 
     Args:
-        pixel: Where the point was seen, in pixels from the image's centre, x right and y up.
+        pixel: Measured pixel, from the image centre, x right and y up.
     """
     return Factor("projection_bal", {"pixel": pixel})
 
@@ -1089,8 +1103,8 @@ def projection_radial_tangential(*, pixel: Numbers, camera: types.RadialTangenti
     ```
 
     Args:
-        pixel: Pixel of the point, x right and y down.
-        camera: The camera that saw it.
+        pixel: Measured pixel, x right and y down.
+        camera: The calibrated camera.
     """
     return Factor("projection_radial_tangential", {"pixel": pixel, "camera": camera})
 
@@ -1108,7 +1122,7 @@ def range_se2_point2(*, range: float) -> Factor:
     ```
 
     Args:
-        range: Their distance, in metres.
+        range: Measured distance, in metres.
     """
     return Factor("range_se2_point2", {"range": range})
 
@@ -1126,7 +1140,7 @@ def range_se2_se2(*, range: float) -> Factor:
     ```
 
     Args:
-        range: Their distance, in metres.
+        range: Measured distance, in metres.
     """
     return Factor("range_se2_se2", {"range": range})
 
@@ -1144,7 +1158,7 @@ def range_se3_point3(*, range: float) -> Factor:
     ```
 
     Args:
-        range: Their distance, in metres.
+        range: Measured distance, in metres.
     """
     return Factor("range_se3_point3", {"range": range})
 
@@ -1162,21 +1176,22 @@ def range_se3_se3(*, range: float) -> Factor:
     ```
 
     Args:
-        range: Their distance, in metres.
+        range: Measured distance, in metres.
     """
     return Factor("range_se3_se3", {"range": range})
 
 
 def resting(*, up: Numbers | None = None) -> Factor:
-    """An object rests: one of its principal axes is vertical, whichever it is.
+    """An object rests: any one of its principal axes is vertical.
 
-    r = up × Q up / ‖Q‖, Q = R diag(s²) Rᵀ. -Q up points from the centre to the point of the ellipsoid that touches the ground: what is
-    in balance has it right below the centre, lying or standing. So no class has to say which axis is up, and a
-    book that stands among books is as good as one that lies. For an axis of length a tilted by θ from the vertical, b the length across it,
-    r is (a² - b²)/√(Σ s⁴) · sin θ cos θ: an object that is as wide as high is free, and there is no jump where another axis gets
-    longer. σ is in these units: radians for a thin rod, less for all else. Moving and growing leave it
-    unchanged, turning about `up` turns r. An axis halfway between two directions in balance is a maximum, where the derivative of the cost vanishes. Defined
-    everywhere.
+    r = up × Q up / ‖Q‖, Q = R diag(s²) Rᵀ. -Q up points from the centre to the lowest point of the ellipsoid.
+    An object in balance, lying or standing, has this point directly below its centre. No class has to define
+    which axis is up: a book that stands among books fits as well as one that lies. For an axis of length a
+    tilted by θ from the vertical, and length b across it, r is (a² - b²)/√(Σ s⁴) · sin θ cos θ. An object
+    that is as wide as high is therefore free to rotate, and there is no jump when a different axis becomes
+    the longest. σ is in these units: radians for a thin rod, less for all other shapes. Invariant to moving
+    and scaling; rotating about `up` rotates r. An axis halfway between two directions in balance is a
+    maximum, at which the derivative of the cost vanishes. Defined everywhere.
 
     ```toml
     [[factors]]
@@ -1186,16 +1201,16 @@ def resting(*, up: Numbers | None = None) -> Factor:
     ```
 
     Args:
-        up: The world's up, of any length but zero. Default: z.
+        up: The world's up direction, of any length but zero. Default: z.
     """
     return Factor("resting", {"up": up})
 
 
 def resting_along() -> Factor:
-    """An object rests on what is level along a direction that is estimated too: r = g × Q g / ‖Q‖.
+    """An object rests, with the up direction as a variable: r = g × Q g / ‖Q‖.
 
-    Variables: the object, and the direction g, such as that of gravity. Objects tell where up is as well as the other way round: where
-    nothing else knows it. Otherwise as `resting`.
+    Variables: the object, and the direction g, for example of gravity. Resting objects then also determine
+    the up direction, which is useful if no other sensor measures it. All else is as in `resting`.
 
     ```toml
     [[factors]]
@@ -1208,10 +1223,10 @@ def resting_along() -> Factor:
 
 
 def shape_prior(*, semi_axes: Numbers, order: Literal['sorted', 'as_given'] | None = None) -> Factor:
-    """An object has the proportions of those of its class, at any size: r = log(s/s₀) less its mean.
+    """An object has the proportions of its class, at any size: r = log(s/s₀) minus its mean.
 
-    Three rows that add up to zero, so they constrain two directions and leave the size free. The order
-    of the axes is as in `size_prior`, and so are its kinks and what equal lengths bring about. Defined everywhere.
+    Three rows that sum to zero, so they constrain two directions and leave the size free. The order of the
+    axes is as in `size_prior`, including its kinks and the effects of equal lengths. Defined everywhere.
 
     ```toml
     [[factors]]
@@ -1221,26 +1236,26 @@ def shape_prior(*, semi_axes: Numbers, order: Literal['sorted', 'as_given'] | No
     ```
 
     Args:
-        semi_axes: The proportions: semi-axes at any scale.
-        order: Which is compared with which. Default: "sorted".
+        semi_axes: Proportions of the class: semi-axes at any scale.
+        order: Order of the semi-axes in the comparison. Default: "sorted".
     """
     return Factor("shape_prior", {"semi_axes": semi_axes, "order": order})
 
 
 def size_prior(*, semi_axes: Numbers, order: Literal['sorted', 'as_given'] | None = None) -> Factor:
-    """An object is as large as those of its class: r = log(s/s₀), the shortest semi-axis first.
+    """An object has the size of its class: r = log(s/s₀), the shortest semi-axis first.
 
-    σ is relative: 0.2 is some 20 %. With `order = "sorted"`, semi-axes are compared by size, so that it
-    does not matter how the object's axes are numbered; where two of them are equally long, the residual
-    is continuous, its derivative jumps from the one axis to the other, the first as it stands being
-    taken for the shorter. Where the two usual lengths are equal as well, the cost has no kink there. With `order = "as_given"`, x is compared with the first, and so on. Defined
-    everywhere.
+    σ is relative: 0.2 is about 20 %. With `order = "sorted"`, semi-axes are compared by size, so the
+    numbering of the object's axes does not matter. If two semi-axes are equally long, the residual is
+    continuous, but its derivative jumps between the two axes; the first in the current numbering counts as
+    the shorter one. If the two usual lengths are equal as well, the cost has no kink there. With `order =
+    "as_given"`, x is compared with the first usual length, and so on. Defined everywhere.
 
-    Two equal lengths, as of a bottle, pull the object towards one that is round about its third axis. How it is
-    turned about that axis is then open, or hard to find: near the round shape this angle is like the angle of polar
-    coordinates near their origin. Where boxes from two places alone say how the object is turned, solvers may take
-    hundreds of steps, in which the cost hardly falls. `prior_quadric`, or boxes from more sides, hold that angle.
-
+    Two equal usual lengths, as for a bottle, pull the object towards a shape that is round about its third
+    axis. The rotation about that axis is then undetermined or poorly determined: close to the round shape it
+    behaves like the angle of polar coordinates close to the origin. If only boxes from two places determine
+    the rotation, solvers may take hundreds of steps during which the cost hardly falls. `prior_quadric`, or
+    boxes from more sides, determine this rotation.
     ```toml
     [[factors]]
     keys   = ["q0"]
@@ -1249,8 +1264,8 @@ def size_prior(*, semi_axes: Numbers, order: Literal['sorted', 'as_given'] | Non
     ```
 
     Args:
-        semi_axes: The usual semi-axes, half the extents, in metres.
-        order: Which is compared with which. Default: "sorted".
+        semi_axes: Usual semi-axes (half the extents), in metres.
+        order: Order of the semi-axes in the comparison. Default: "sorted".
     """
     return Factor("size_prior", {"semi_axes": semi_axes, "order": order})
 
@@ -1258,11 +1273,12 @@ def size_prior(*, semi_axes: Numbers, order: Literal['sorted', 'as_given'] | Non
 def supporting_plane() -> Factor:
     """The lowest point of an object is on a plane that is estimated too: r = n · c - offset - e, in metres.
 
-    Variables: the object, with centroid c, and the plane, with normal n. e = √Σ (sₖ Rₖ · n)² is half the object's extent along
-    n, over its semi-axes s and their directions R. r is the gap; an object that sinks into the plane has a negative one.
-    Sliding along the plane and turning about its normal leave it unchanged. Smooth and defined everywhere. Three objects
-    or more that do not stand in a line hold the plane; fewer need a `prior_plane`. Supporting planes of quadrics: Hosseinzadeh et
-    al., *Structure Aware SLAM using Quadrics and Planes* (2018).
+    Variables: the object, with centroid c, and the plane, with normal n. e = √Σ (sₖ Rₖ · n)² is half the
+    object's extent along n, for semi-axes s with directions R. r is the gap; it is negative if the object
+    sinks into the plane. Invariant to sliding along the plane and to rotating about its normal. Smooth and
+    defined everywhere. Three or more objects that are not in a line determine the plane; with fewer, add a
+    `prior_plane`. For supporting planes of quadrics see Hosseinzadeh et al., *Structure Aware SLAM using
+    Quadrics and Planes* (2018).
 
     ```toml
     [[factors]]
@@ -1277,16 +1293,17 @@ def supporting_plane() -> Factor:
 def tangent_planes(*, box: Numbers, camera: types.Camera) -> Factor:
     """The planes through a camera and the sides of a box touch the object: rₖ = nₖ · c - eₖ, in metres.
 
-    Variables: the pose of the camera and the object, with its centroid c in the camera's frame. nₖ is the unit normal of
-    plane πₖ = Pᵀlₖ towards the inside of the box, eₖ half the object's extent along it. The algebraic form of the same
-    constraint, πₖᵀ Q* πₖ = eₖ² - (nₖ · c)² = 0 (Rubino et al., *3D Object Localisation from Multi-View Object Detections*, 2018),
-    is zero for an object on the wrong side too; this root of it is not. Rows: left, top, right, bottom.
+    Variables: the pose of the camera and the object, with centroid c in the camera's frame. nₖ is the unit
+    normal of plane πₖ = Pᵀlₖ, pointing to the inside of the box, and eₖ half the object's extent along it.
+    The algebraic form of this constraint, πₖᵀ Q* πₖ = eₖ² - (nₖ · c)² = 0 (Rubino et al., *3D Object
+    Localisation from Multi-View Object Detections*, 2018), is also zero for an object on the wrong side; this
+    form is not. Rows: left, top, right, bottom.
 
-    It is smooth and defined everywhere, where `bounding_box` is not: behind the camera, around it, across its plane. So it pulls an
-    object into view from a bad start; then `bounding_box`, whose noise is that of a detector, should take over. An object as small
-    as a point at the camera satisfies it exactly: two views or a size prior keep it from there. Begin large: a tiny object behind all
-    cameras shrinks to a point. σ is in metres at the
-    object: σ pixels at depth z are about σ z / f.
+    Unlike `bounding_box` it is smooth and defined everywhere: also behind the camera, around it and across
+    its plane. It therefore pulls an object into view from a bad initial value; then `bounding_box`, whose
+    noise matches a detector, should take over. An object that shrinks to a point at the camera satisfies it
+    exactly; two views or a size prior prevent this. Use a large initial size: a tiny object behind all
+    cameras shrinks to a point. σ is in metres at the object: σ pixels at depth z are about σ z / f.
 
     ```toml
     [[factors]]
@@ -1296,8 +1313,8 @@ def tangent_planes(*, box: Numbers, camera: types.Camera) -> Factor:
     ```
 
     Args:
-        box: The box that was measured: xmin, ymin, xmax, ymax, in pixels.
-        camera: The camera that saw it.
+        box: Measured box: xmin, ymin, xmax, ymax, in pixels.
+        camera: The calibrated camera.
     """
     return Factor("tangent_planes", {"box": box, "camera": camera})
 
@@ -1309,10 +1326,11 @@ def upright(
 ) -> Factor:
     """A named axis of an object is vertical: r = a × up, of length sin(tilt).
 
-    `vertical_orientation_smooth` for any axis: a plate lies flat with `axis = "shortest"`, a thing with axes of its own stands with
-    `axis = "z"`. Upside down is as good as upright. σ is in radians of tilt. Turning about `up`, moving and growing
-    leave it unchanged. `longest` and `shortest` jump where another axis takes the place; a horizontal axis is a maximum, where the
-    derivative of the cost vanishes. Defined everywhere.
+    Like `vertical_orientation_smooth`, but for any axis: a plate lies flat with `axis = "shortest"`, an
+    object with known local axes stands with `axis = "z"`. Upside down counts as upright. σ is in radians of
+    tilt. Invariant to rotating about `up`, moving and scaling. `longest` and `shortest` jump if a different
+    axis becomes the longest or the shortest. A horizontal axis is a maximum, at which the derivative of the
+    cost vanishes. Defined everywhere.
 
     ```toml
     [[factors]]
@@ -1323,16 +1341,17 @@ def upright(
 
     Args:
         axis: The axis: longest, shortest, x, y or z. Default: longest.
-        up: The world's up, of any length but zero. Default: z.
+        up: The world's up direction, of any length but zero. Default: z.
     """
     return Factor("upright", {"axis": axis, "up": up})
 
 
 def upright_along(*, axis: Literal['longest', 'shortest', 'x', 'y', 'z'] | None = None) -> Factor:
-    """A named axis of an object is along a direction that is estimated too: r = a × g, of length sin(angle).
+    """A named axis of an object is vertical, with the up direction as a variable: r = a × g, of length
+    sin(angle).
 
-    Variables: the object, and the direction g, such as that of gravity. Objects that stand upright tell where up is as well as the
-    other way round. Otherwise as `upright`.
+    Variables: the object, and the direction g, for example of gravity. Upright objects then also determine
+    the up direction. All else is as in `upright`.
 
     ```toml
     [[factors]]
@@ -1350,12 +1369,12 @@ def upright_along(*, axis: Literal['longest', 'shortest', 'x', 'y', 'z'] | None 
 def vertical_orientation(*, up: Numbers | None = None) -> Factor:
     """The major semi-axis m of an object is vertical: r = 1 - |m · up|   (Jablonsky et al., eq. 7).
 
-    Turning about `up`, moving, growing and turning upside down leave it unchanged. Its derivative
-    vanishes where m is vertical, so the last digits come slowly there;
-    `vertical_orientation_smooth` has no such place. Where m is exactly horizontal, |·| has a kink;
-    the derivative is that of m · up > 0. m is the longest semi-axis at the current estimate, the first
-    of equals: where another becomes the longest, the residual jumps to the angle of that axis, and a
-    nearly round object is pulled by whichever axis leads. It is defined everywhere.
+    Invariant to rotation about `up`, to moving and scaling, and to turning the object upside down. Its
+    derivative vanishes if m is vertical, so convergence slows down close to it;
+    `vertical_orientation_smooth` avoids this. If m is exactly horizontal, |·| has a kink; the derivative
+    for m · up > 0 is used. m is the longest semi-axis at the current estimate, the first of equal ones.
+    If a different axis becomes the longest, the residual jumps to the angle of that axis, and a nearly
+    round object is pulled by whichever axis is longest. Defined everywhere.
 
     ```toml
     [[factors]]
@@ -1365,7 +1384,7 @@ def vertical_orientation(*, up: Numbers | None = None) -> Factor:
     ```
 
     Args:
-        up: The world's up, of any length but zero. Default: z.
+        up: The world's up direction, of any length but zero. Default: z.
     """
     return Factor("vertical_orientation", {"up": up})
 
@@ -1373,10 +1392,11 @@ def vertical_orientation(*, up: Numbers | None = None) -> Factor:
 def vertical_orientation_smooth(*, up: Numbers | None = None) -> Factor:
     """The major semi-axis m of an object is vertical: r = m × up, of length sin(tilt).
 
-    The components of m perpendicular to `up`, turned by a quarter about it: `vertical_orientation`
-    without its kink and without its flat place, so that Gauss-Newton converges at its usual speed.
-    σ is in radians of tilt, near the vertical. The jump between axes of equal length is the same.
-    A horizontal m is a maximum, where the derivative of the cost vanishes.
+    The residual is the component of m perpendicular to `up`, turned by a quarter about it. Unlike
+    `vertical_orientation` it has no kink and no vanishing derivative at the solution, so Gauss-Newton
+    converges at its usual rate. σ is in radians of tilt, close to the vertical. The jump between axes of
+    equal length is as in `vertical_orientation`. A horizontal m is a maximum, at which the derivative of
+    the cost vanishes.
 
     ```toml
     [[factors]]
@@ -1386,6 +1406,6 @@ def vertical_orientation_smooth(*, up: Numbers | None = None) -> Factor:
     ```
 
     Args:
-        up: The world's up, of any length but zero. Default: z.
+        up: The world's up direction, of any length but zero. Default: z.
     """
     return Factor("vertical_orientation_smooth", {"up": up})

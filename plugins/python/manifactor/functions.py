@@ -10,7 +10,7 @@ from .formula import call
 
 
 def abs(a: Any, /) -> Any:
-    """abs(a: number) -> number: The absolute value. At zero it has a kink; the derivative taken there is that of a > 0.
+    """abs(a: number) -> number: The absolute value. It has a kink at zero; the derivative for a > 0 is used there.
 
     abs(v: vector3) -> vector3: The absolute value of each component.
     """
@@ -18,7 +18,7 @@ def abs(a: Any, /) -> Any:
 
 
 def acos(a: Any, /) -> Any:
-    """acos(a: number) -> number: The angle of a cosine, in radians. Its derivative at ±1 is infinite: `angle(a, b)` has no such place but 0 and π."""
+    """acos(a: number) -> number: The arccosine, in radians. Its derivative at ±1 is infinite; `angle(a, b)` has kinks only at 0 and π."""
     return call("acos", a)
 
 
@@ -27,18 +27,18 @@ def angle(*arguments: Any) -> Any:
 
     angle(a: vector2, b: vector2) -> number: The angle from a to b, counter-clockwise, within -π..π.
 
-    angle(a: vector3, b: vector3) -> number: The angle between two vectors, 0 to π. At both ends it has a kink; the derivative taken there is zero.
+    angle(a: vector3, b: vector3) -> number: The angle between two vectors, 0 to π. It has a kink at both ends; the derivative returned there is zero.
     """
     return call("angle", *arguments)
 
 
 def asin(a: Any, /) -> Any:
-    """asin(a: number) -> number: The angle of a sine, in radians. Its derivative at ±1 is infinite."""
+    """asin(a: number) -> number: The arcsine, in radians. Its derivative at ±1 is infinite."""
     return call("asin", a)
 
 
 def atan(a: Any, /) -> Any:
-    """atan(a: number) -> number: The angle of a tangent, in radians."""
+    """atan(a: number) -> number: The arctangent, in radians."""
     return call("atan", a)
 
 
@@ -48,13 +48,13 @@ def atan2(a: Any, b: Any, /) -> Any:
 
 
 def between(a: Any, b: Any, /) -> Any:
-    """between(x: se2, y: se2) -> se2: The pose y, seen from x: x⁻¹y.
+    """between(x: se2, y: se2) -> se2: The pose y in the frame of x: x⁻¹y.
 
-    between(x: se3, y: se3) -> se3: The pose y, seen from x: x⁻¹y.
+    between(x: se3, y: se3) -> se3: The pose y in the frame of x: x⁻¹y.
 
-    between(x: so2, y: so2) -> so2: How y is turned, seen from x: x⁻¹y.
+    between(x: so2, y: so2) -> so2: The rotation y in the frame of x: x⁻¹y.
 
-    between(x: so3, y: so3) -> so3: How y is turned, seen from x: x⁻¹y.
+    between(x: so3, y: so3) -> so3: The rotation y in the frame of x: x⁻¹y.
     """
     return call("between", a, b)
 
@@ -70,29 +70,29 @@ def cos(a: Any, /) -> Any:
 
 
 def cross(a: Any, b: Any, /) -> Any:
-    """cross(a: vector2, b: vector2) -> number: The area between two vectors, with its sign.
+    """cross(a: vector2, b: vector2) -> number: The signed area of the parallelogram between two vectors.
 
-    cross(a: vector3, b: vector3) -> vector3: The vector product.
+    cross(a: vector3, b: vector3) -> vector3: The cross product.
     """
     return call("cross", a, b)
 
 
 def distance(a: Any, b: Any, /) -> Any:
-    """distance(a: vector2, b: vector2) -> number: How far apart two points are. Where they meet, its derivative is taken as zero.
+    """distance(a: vector2, b: vector2) -> number: The distance between two points. If they coincide, the derivative returned is zero.
 
-    distance(a: vector3, b: vector3) -> number: How far apart two points are. Where they meet, its derivative is taken as zero.
+    distance(a: vector3, b: vector3) -> number: The distance between two points. If they coincide, the derivative returned is zero.
 
-    distance(a: vector6, b: vector6) -> number: How far apart two points are. Where they meet, its derivative is taken as zero.
+    distance(a: vector6, b: vector6) -> number: The distance between two points. If they coincide, the derivative returned is zero.
     """
     return call("distance", a, b)
 
 
 def divide(a: Any, b: Any, /) -> Any:
-    """divide(a: vector2, b: vector2) -> vector2: Component by component.
+    """divide(a: vector2, b: vector2) -> vector2: The componentwise quotient.
 
-    divide(a: vector3, b: vector3) -> vector3: Component by component.
+    divide(a: vector3, b: vector3) -> vector3: The componentwise quotient.
 
-    divide(a: vector6, b: vector6) -> vector6: Component by component.
+    divide(a: vector6, b: vector6) -> vector6: The componentwise quotient.
     """
     return call("divide", a, b)
 
@@ -108,38 +108,38 @@ def dot(a: Any, b: Any, /) -> Any:
 
 
 def exp(a: Any, /) -> Any:
-    """exp(a: number) -> number: The exponential."""
+    """exp(a: number) -> number: The exponential function."""
     return call("exp", a)
 
 
 def extent(a: Any, b: Any, /) -> Any:
-    """extent(q: dual_quadric, u: vector3) -> number: Half the extent of an object along a unit vector u, √Σ (sₖ Rₖ · u)²: so far above its lowest point is its centre."""
+    """extent(q: dual_quadric, u: vector3) -> number: Half the extent of an object along a unit vector u, √Σ (sₖ Rₖ · u)². The centre is this far above the lowest point."""
     return call("extent", a, b)
 
 
 def height(a: Any, b: Any, /) -> Any:
-    """height(plane: plane, p: vector3) -> number: How far a point is above a plane, along its normal."""
+    """height(plane: plane, p: vector3) -> number: The height of a point above a plane, along its normal."""
     return call("height", a, b)
 
 
 def inverse(a: Any, /) -> Any:
-    """inverse(x: se2) -> se2: The outer frame, seen from x: `inverse(x) * p` is a point, seen from x.
+    """inverse(x: se2) -> se2: The inverse pose: `inverse(x) * p` is the point p in the frame of x.
 
-    inverse(x: se3) -> se3: The outer frame, seen from x: `inverse(x) * p` is a point, seen from x.
+    inverse(x: se3) -> se3: The inverse pose: `inverse(x) * p` is the point p in the frame of x.
 
-    inverse(x: so2) -> so2: The rotation back.
+    inverse(x: so2) -> so2: The inverse rotation.
 
-    inverse(x: so3) -> so3: The rotation back.
+    inverse(x: so3) -> so3: The inverse rotation.
     """
     return call("inverse", a)
 
 
 def largest(a: Any, /) -> Any:
-    """largest(v: vector2) -> number: The greatest component, the first of equals.
+    """largest(v: vector2) -> number: The largest component, the first of equal ones.
 
-    largest(v: vector3) -> number: The greatest component, the first of equals.
+    largest(v: vector3) -> number: The largest component, the first of equal ones.
 
-    largest(v: vector6) -> number: The greatest component, the first of equals.
+    largest(v: vector6) -> number: The largest component, the first of equal ones.
     """
     return call("largest", a)
 
@@ -153,109 +153,109 @@ def ln(a: Any, /) -> Any:
 
 
 def log(a: Any, /) -> Any:
-    """log(x: se2) -> vector3: The tangent vector (v, θ) that leads from the outer frame to the pose.
+    """log(x: se2) -> vector3: The tangent vector (v, θ) from the identity to the pose.
 
-    log(x: se3) -> vector6: The tangent vector (ω, v) that leads from the outer frame to the pose.
+    log(x: se3) -> vector6: The tangent vector (ω, v) from the identity to the pose.
 
-    log(x: so3) -> vector3: The rotation vector, shorter than half a turn, in radians.
+    log(x: so3) -> vector3: The shortest rotation vector, of length π at most, in radians.
     """
     return call("log", a)
 
 
 def major_axis(a: Any, /) -> Any:
-    """major_axis(q: dual_quadric) -> vector3: The direction of the longest semi-axis, the first of equals; its sign means nothing."""
+    """major_axis(q: dual_quadric) -> vector3: The unit direction of the longest semi-axis, the first of equal ones. Its sign is arbitrary."""
     return call("major_axis", a)
 
 
 def max(a: Any, b: Any, /) -> Any:
-    """max(a: number, b: number) -> number: The greater of two, the first of equals."""
+    """max(a: number, b: number) -> number: The larger of two numbers, the first if they are equal."""
     return call("max", a, b)
 
 
 def min(a: Any, b: Any, /) -> Any:
-    """min(a: number, b: number) -> number: The lesser of two, the first of equals."""
+    """min(a: number, b: number) -> number: The smaller of two numbers, the first if they are equal."""
     return call("min", a, b)
 
 
 def multiply(a: Any, b: Any, /) -> Any:
-    """multiply(a: vector2, b: vector2) -> vector2: Component by component.
+    """multiply(a: vector2, b: vector2) -> vector2: The componentwise product.
 
-    multiply(a: vector3, b: vector3) -> vector3: Component by component.
+    multiply(a: vector3, b: vector3) -> vector3: The componentwise product.
 
-    multiply(a: vector6, b: vector6) -> vector6: Component by component.
+    multiply(a: vector6, b: vector6) -> vector6: The componentwise product.
     """
     return call("multiply", a, b)
 
 
 def norm(a: Any, /) -> Any:
-    """norm(v: vector2) -> number: The length. At zero it has a kink; the derivative taken there is zero.
+    """norm(v: vector2) -> number: The length. It has a kink at zero; the derivative returned there is zero.
 
-    norm(v: vector3) -> number: The length. At zero it has a kink; the derivative taken there is zero.
+    norm(v: vector3) -> number: The length. It has a kink at zero; the derivative returned there is zero.
 
-    norm(v: vector6) -> number: The length. At zero it has a kink; the derivative taken there is zero.
+    norm(v: vector6) -> number: The length. It has a kink at zero; the derivative returned there is zero.
     """
     return call("norm", a)
 
 
 def norm_squared(a: Any, /) -> Any:
-    """norm_squared(v: vector2) -> number: The sum of the squares.
+    """norm_squared(v: vector2) -> number: The squared length.
 
-    norm_squared(v: vector3) -> number: The sum of the squares.
+    norm_squared(v: vector3) -> number: The squared length.
 
-    norm_squared(v: vector6) -> number: The sum of the squares.
+    norm_squared(v: vector6) -> number: The squared length.
     """
     return call("norm_squared", a)
 
 
 def normal(a: Any, /) -> Any:
-    """normal(plane: plane) -> vector3: The normal of a plane, a unit vector."""
+    """normal(plane: plane) -> vector3: The unit normal of a plane."""
     return call("normal", a)
 
 
 def offset(a: Any, /) -> Any:
-    """offset(plane: plane) -> number: How far a plane is from the origin along its normal."""
+    """offset(plane: plane) -> number: The distance of a plane from the origin along its normal."""
     return call("offset", a)
 
 
 def pose(*arguments: Any) -> Any:
-    """pose(q: dual_quadric) -> se3: The pose of an object, from its own frame to the outer one.
+    """pose(q: dual_quadric) -> se3: The pose of an object, from its local frame to the outer one.
 
-    pose(rotation: so2, position: vector2) -> se2: The pose of that rotation, there.
+    pose(rotation: so2, position: vector2) -> se2: The pose with this rotation and this position.
 
-    pose(rotation: so3, position: vector3) -> se3: The pose of that rotation, there.
+    pose(rotation: so3, position: vector3) -> se3: The pose with this rotation and this position.
     """
     return call("pose", *arguments)
 
 
 def position(a: Any, /) -> Any:
-    """position(x: se2) -> vector2: Where a pose is.
+    """position(x: se2) -> vector2: The position of a pose.
 
-    position(x: se3) -> vector3: Where a pose is.
+    position(x: se3) -> vector3: The position of a pose.
     """
     return call("position", a)
 
 
 def project(a: Any, /) -> Any:
-    """project(v: vector3) -> vector2: Where a point is seen, in the frame of a camera that looks along z: (x, y)/z."""
+    """project(v: vector3) -> vector2: The projection (x, y)/z of a point in the frame of a camera that looks along z."""
     return call("project", a)
 
 
 def rotation(a: Any, /) -> Any:
-    """rotation(q: dual_quadric) -> so3: Which way an object is turned.
+    """rotation(q: dual_quadric) -> so3: The rotation of an object.
 
-    rotation(angle: number) -> so2: The rotation by an angle in radians, counter-clockwise.
+    rotation(angle: number) -> so2: The rotation by `angle`, in radians, counter-clockwise.
 
-    rotation(x: se2) -> so2: Which way a pose is turned.
+    rotation(x: se2) -> so2: The rotation of a pose.
 
-    rotation(x: se3) -> so3: Which way a pose is turned.
+    rotation(x: se3) -> so3: The rotation of a pose.
 
-    rotation(omega: vector3) -> so3: The rotation about a vector by its length, in radians.
+    rotation(omega: vector3) -> so3: The rotation about the vector `omega` by its length, in radians.
     """
     return call("rotation", a)
 
 
 def semi_axes(a: Any, /) -> Any:
-    """semi_axes(q: dual_quadric) -> vector3: Half the extents of an object along its own axes."""
+    """semi_axes(q: dual_quadric) -> vector3: Half the extents of an object along its principal axes."""
     return call("semi_axes", a)
 
 
@@ -265,11 +265,11 @@ def sin(a: Any, /) -> Any:
 
 
 def smallest(a: Any, /) -> Any:
-    """smallest(v: vector2) -> number: The least component, the first of equals.
+    """smallest(v: vector2) -> number: The smallest component, the first of equal ones.
 
-    smallest(v: vector3) -> number: The least component, the first of equals.
+    smallest(v: vector3) -> number: The smallest component, the first of equal ones.
 
-    smallest(v: vector6) -> number: The least component, the first of equals.
+    smallest(v: vector6) -> number: The smallest component, the first of equal ones.
     """
     return call("smallest", a)
 
@@ -295,37 +295,37 @@ def tan(a: Any, /) -> Any:
 
 
 def unit(a: Any, /) -> Any:
-    """unit(v: vector2) -> vector2: The vector, one long.
+    """unit(v: vector2) -> vector2: The vector, normalized to length one.
 
-    unit(v: vector3) -> vector3: The vector, one long.
+    unit(v: vector3) -> vector3: The vector, normalized to length one.
 
-    unit(v: vector6) -> vector6: The vector, one long.
+    unit(v: vector6) -> vector6: The vector, normalized to length one.
     """
     return call("unit", a)
 
 
 def vector(*arguments: Any) -> Any:
-    """vector(x: number, y: number) -> vector2: The vector of these; `[x, y]` is short for it.
+    """vector(x: number, y: number) -> vector2: The vector of two components; `[x, y]` is short for it.
 
-    vector(x: number, y: number, z: number) -> vector3: The vector of these; `[x, y, z]` is short for it.
+    vector(x: number, y: number, z: number) -> vector3: The vector of three components; `[x, y, z]` is short for it.
     """
     return call("vector", *arguments)
 
 
 def where(a: Any, b: Any, c: Any, /) -> Any:
-    """where(positive: number, a: number, b: number) -> number: A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
+    """where(positive: number, a: number, b: number) -> number: A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected branch.
 
-    where(positive: number, a: vector2, b: vector2) -> vector2: A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
+    where(positive: number, a: vector2, b: vector2) -> vector2: A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected branch.
 
-    where(positive: number, a: vector3, b: vector3) -> vector3: A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
+    where(positive: number, a: vector3, b: vector3) -> vector3: A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected branch.
 
-    where(positive: number, a: vector6, b: vector6) -> vector6: A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
+    where(positive: number, a: vector6, b: vector6) -> vector6: A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected branch.
     """
     return call("where", a, b, c)
 
 
 def wrap(a: Any, /) -> Any:
-    """wrap(angle: number) -> number: The same angle within -π..π, in radians."""
+    """wrap(angle: number) -> number: The angle wrapped to -π..π, in radians."""
     return call("wrap", a)
 
 
@@ -338,9 +338,9 @@ def x(a: Any, /) -> Any:
 
 
 def x_axis(a: Any, /) -> Any:
-    """x_axis(x: so2) -> vector2: The x axis, turned.
+    """x_axis(x: so2) -> vector2: The x axis of the rotated frame.
 
-    x_axis(x: so3) -> vector3: The x axis, turned.
+    x_axis(x: so3) -> vector3: The x axis of the rotated frame.
     """
     return call("x_axis", a)
 
@@ -354,9 +354,9 @@ def y(a: Any, /) -> Any:
 
 
 def y_axis(a: Any, /) -> Any:
-    """y_axis(x: so2) -> vector2: The y axis, turned.
+    """y_axis(x: so2) -> vector2: The y axis of the rotated frame.
 
-    y_axis(x: so3) -> vector3: The y axis, turned.
+    y_axis(x: so3) -> vector3: The y axis of the rotated frame.
     """
     return call("y_axis", a)
 
@@ -367,5 +367,5 @@ def z(a: Any, /) -> Any:
 
 
 def z_axis(a: Any, /) -> Any:
-    """z_axis(x: so3) -> vector3: The z axis, turned."""
+    """z_axis(x: so3) -> vector3: The z axis of the rotated frame."""
     return call("z_axis", a)

@@ -37,9 +37,9 @@ def cauchy(*, scale: float | None = None) -> Loss:
 def dcs(*, scale: float | None = None) -> Loss:
     """Dynamic covariance scaling: squares up to s = k, weight (2k/(k + s))² beyond.
 
-    Unlike the others its scale Φ = k is in units of s itself, squares of σ's (Agarwal et al., ICRA 2013, eq. 15). The cost
-    is the integral of the weight, ρ = k (3s - k)/(k + s) beyond k, and saturates at 3k: the paper gives
-    a weight only.
+    Unlike in the other losses, the scale Φ = k is in units of s, i.e. squared σ's (Agarwal et al., ICRA
+    2013, eq. 15). The paper gives only a weight. The cost is its integral: ρ = k (3s - k)/(k + s)
+    beyond k, which saturates at 3k.
 
     ```toml
     loss = { type = "dcs", scale = 1.0 }
@@ -93,8 +93,8 @@ def huber(*, scale: float | None = None) -> Loss:
 def l1(*, scale: float | None = None) -> Loss:
     """The norm instead of its square: ρ = 2k√s.
 
-    The scale is the slope: half the cost of one more σ. The weight k/√s has no bound; below √s = 1e-6 k the loss
-    continues as a parabola of the same slope.
+    The scale is the slope: half the cost of one more σ. The weight k/√s has no bound; below √s = 1e-6 k
+    the loss continues as a parabola with the slope at that point.
 
     ```toml
     loss = { type = "l1" }
@@ -107,7 +107,7 @@ def l1(*, scale: float | None = None) -> Loss:
 
 
 def l2() -> Loss:
-    """No robustness: ρ = s. The same as no loss at all.
+    """No robustness: ρ = s. Equivalent to no loss.
 
     ```toml
     loss = { type = "l2" }
@@ -117,26 +117,26 @@ def l2() -> Loss:
 
 
 def tempered(*, tau: float, loss: Loss) -> Loss:
-    """Another loss at another temperature: ρ(τs)/τ.
+    """A loss at a different temperature: ρ(τs)/τ.
 
-    Where τ residuals of a kind say as much as one alone, their noise is made √τ times as large. This loss still counts
-    in the σ of one: a residual is an outlier among the residuals, not among means of τ of them. Small residuals cost what
-    they cost without it. A built-in loss is that loss with another scale, and cheaper so: `scale` / √τ, for `dcs`
-    `scale` / τ.
+    If τ residuals of a kind carry the information of one, their σ is multiplied by √τ. This loss still
+    counts in the σ of a single residual: an outlier is one among single residuals, not among means of τ of
+    them. Small residuals cost as much as without the loss. The built-in losses need no wrapper, which is
+    cheaper: use `scale` / √τ, or `scale` / τ for `dcs`.
 
     ```toml
     loss = { type = "tempered", tau = 4.0, loss = { type = "huber", scale = 1.345 } }
     ```
 
     Args:
-        tau: τ: how many residuals say as much as one alone.
-        loss: ρ.
+        tau: τ: the number of residuals that carry the information of one.
+        loss: The loss ρ.
     """
     return Loss("tempered", {"tau": tau, "loss": loss})
 
 
 def tukey(*, scale: float | None = None) -> Loss:
-    """Ignores what lies beyond the scale: ρ = k²/3 (1 - (1 - s/k²)³) up to √s = k, k²/3 beyond.
+    """Ignores residuals beyond the scale: ρ = k²/3 (1 - (1 - s/k²)³) up to √s = k, k²/3 beyond.
 
     ```toml
     loss = { type = "tukey", scale = 4.685 }

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-from . import types
+from . import types, variables
 from .chosen import Numbers, Solver
 
 
@@ -21,26 +21,30 @@ __all__ = [
 
 
 def auto(*, stop: types.Stopping | None = None, linear: types.LinearSolver | None = None) -> Solver:
-    """Gauss-Newton steps that are damped once one fails, and another start where the first leads nowhere.
+    """Gauss-Newton steps, with damping once a step fails, and further starts if the given values lead to no
+    minimum.
 
-    Begins at the given values. Where a full step raises the cost and the next is not much shorter, where the cost has not
-    settled after ten steps, or where a registered start doubts the minimum, every registered start that applies to the
-    graph is tried, those of the lowest cost first, until one leads to a minimum. The best minimum found is the estimate.
-    If no start leads to a minimum, a dogleg from the given values is the last attempt.
-    None of this depends on the unit of the noise: covariances that are too small by a factor change nothing. Where no
-    start applies, it is Levenberg-Marquardt with next to no damping. Starts need the graph, and those of a plugin are there
-    once it is linked: so a compiled problem alone (`descend`) is moved by damped steps from where it is.
+    Begins at the given values. Further starts are tried if a full step raises the cost and the next one is
+    not much shorter. They are also tried if the cost has not converged after ten steps, or if a registered
+    start doubts the minimum. Every registered start that applies to the graph is then tried, in ascending
+    order of cost, until one leads to a minimum. The best minimum found is the estimate. If no start leads
+    to a minimum, a dogleg from the given values is the last attempt.
+
+    None of this depends on the unit of the noise: covariances that are too small by a factor have no
+    effect. If no start applies, the solver is Levenberg-Marquardt with almost no damping. Starts need the
+    graph, and the starts of a plugin are available once it is linked. A compiled problem alone (`descend`)
+    is therefore solved by damped steps from its current estimate.
 
     ```toml
     solver = { type = "auto", stop = { relative_cost = 1e-6 } }
     ```
 
     Args:
-        stop: When to stop, from each start. Default: {"max_iterations": 100, "relative_cost": 1e-08,
+        stop: Stopping criteria, for each start. Default: {"max_iterations": 100, "relative_cost": 1e-08,
             "absolute_cost": 1e-20, "gradient": 1e-12, "step": 1e-12}.
-        linear: How the linear system of each step is solved. Default: {"method": "auto", "ordering":
-            "auto", "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi",
-            "tolerance": 1e-06, "max_iterations": 1000}}.
+        linear: Solver of the linear system of each step. Default: {"method": "auto", "ordering": "auto",
+            "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi", "tolerance":
+            1e-06, "max_iterations": 1000}}.
     """
     return Solver("auto", {"stop": stop, "linear": linear})
 
@@ -53,23 +57,23 @@ def dogleg(
 ) -> Solver:
     """Steps within a trust region, each of which lowers the cost.
 
-    The step is the Gauss-Newton step where that is within the radius, else the point on the path from
-    the minimum along the gradient to it. Lengths are measured by √diag H, so that radians and metres
-    compare. A refused step costs neither a linearization nor a factorization. A direction that nothing constrains is
-    left alone, and named by the outcome.
+    Within the radius, the step is the Gauss-Newton step. Otherwise it is the point at the radius on the
+    path to that step by way of the minimum along the gradient. Lengths are scaled by √diag H, which makes
+    radians and metres comparable. A rejected step costs neither a linearization nor a factorization. The
+    solver does not move along an undetermined direction; the outcome reports it.
 
     ```toml
     solver = { type = "dogleg", stop = { max_iterations = 50 } }
     ```
 
     Args:
-        initial_radius: Radius of the first step, in standard deviations; the length of the first Gauss-
-            Newton step, where it is not given.
-        stop: When to stop. Default: {"max_iterations": 100, "relative_cost": 1e-08, "absolute_cost":
+        initial_radius: Radius of the first step, in standard deviations. Default: the length of the first
+            Gauss-Newton step.
+        stop: Stopping criteria. Default: {"max_iterations": 100, "relative_cost": 1e-08, "absolute_cost":
             1e-20, "gradient": 1e-12, "step": 1e-12}.
-        linear: How the linear system of each step is solved. Default: {"method": "auto", "ordering":
-            "auto", "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi",
-            "tolerance": 1e-06, "max_iterations": 1000}}.
+        linear: Solver of the linear system of each step. Default: {"method": "auto", "ordering": "auto",
+            "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi", "tolerance":
+            1e-06, "max_iterations": 1000}}.
     """
     return Solver("dogleg", {"initial_radius": initial_radius, "stop": stop, "linear": linear})
 
@@ -77,20 +81,20 @@ def dogleg(
 def gauss_newton(*, stop: types.Stopping | None = None, linear: types.LinearSolver | None = None) -> Solver:
     """Full steps to the minimum of the linearized cost: H δ = -g.
 
-    The fastest where the start is good. A step may raise the cost; one that leaves the domain of a
-    factor is halved until it does not. Five rises in a row end the solve, with the best estimate so
-    far. A direction that nothing constrains is left alone, and named by the outcome.
+    The fastest solver from a good initial guess. A step may raise the cost. A step that leaves the domain
+    of a factor is halved until it does not. Five rises in a row end the solve, with the best estimate so
+    far. The solver does not move along an undetermined direction; the outcome reports it.
 
     ```toml
     solver = { type = "gauss_newton", stop = { max_iterations = 50 } }
     ```
 
     Args:
-        stop: When to stop. Default: {"max_iterations": 100, "relative_cost": 1e-08, "absolute_cost":
+        stop: Stopping criteria. Default: {"max_iterations": 100, "relative_cost": 1e-08, "absolute_cost":
             1e-20, "gradient": 1e-12, "step": 1e-12}.
-        linear: How the linear system of each step is solved. Default: {"method": "auto", "ordering":
-            "auto", "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi",
-            "tolerance": 1e-06, "max_iterations": 1000}}.
+        linear: Solver of the linear system of each step. Default: {"method": "auto", "ordering": "auto",
+            "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi", "tolerance":
+            1e-06, "max_iterations": 1000}}.
     """
     return Solver("gauss_newton", {"stop": stop, "linear": linear})
 
@@ -106,17 +110,18 @@ def gnc(
     step: float | None = None,
     solver: Solver | None = None,
 ) -> Solver:
-    """Rejects outliers: solves with all factors, then with ever less weight on those that do not fit.
+    """Rejects outliers: solves with all factors, then with decreasing weights on factors that do not fit.
 
-    Yang, Antonante, Tzoumas, Carlone, *Graduated Non-Convexity for Robust Spatial Perception*, RA-L 2020. Each
-    candidate i costs c²ρ_μ(‖rᵢ‖²/c²), where c² is what an inlier may have; μ leads from a convex ρ_μ to one that is
-    truncated. For each μ the weighted problem is solved from the last estimate and from the best registered start
-    for the weighted graph, and the better of the two goes on. At the end the same is tried with fewer and with more
-    factors than those that fit, as long as that lowers the robust cost.
+    Yang, Antonante, Tzoumas, Carlone, *Graduated Non-Convexity for Robust Spatial Perception*, RA-L 2020.
+    Each candidate i costs c²ρ_μ(‖rᵢ‖²/c²), with the inlier bound c². μ leads from a convex ρ_μ to a
+    truncated one. For each μ the weighted problem is solved from the last estimate and from the best
+    registered start for the weighted graph. The better of the two results is kept. At the end, solves with
+    fewer and with more factors than the inliers are tried, as long as they lower the robust cost.
 
-    Candidates are loop closures: factors that couple variables, except the only one between variables that follow one another. A factor's own loss stays; its cost is
-    what counts as ‖r‖². The outcome lists the factors that are rejected. Its costs are those of the weighted problem:
-    the first with all factors, the last with what is kept.
+    Candidates are loop closures: factors that couple variables, except the only factor between two
+    consecutive variables. A factor's own loss stays; its cost replaces ‖r‖². The outcome lists the rejected
+    factors. Its costs belong to the weighted problem: the initial cost with all factors, the final cost
+    with the remaining ones.
 
     ```toml
     solver = { type = "gnc", probability = 0.99, types = ["between_se2"], solver = { type = "dogleg" } }
@@ -124,18 +129,17 @@ def gnc(
 
     Args:
         cost: The robust cost. Default: "truncated_least_squares".
-        probability: Share of the inliers that are to be kept: c² is the χ² quantile for the rows of each
-            factor. Default: 0.99.
-        threshold: c itself, in standard deviations, for all factors, instead of `probability`.
+        probability: Share of the inliers to keep: c² is the χ² quantile for the rows of each factor.
+            Default: 0.99.
+        threshold: c in standard deviations, for all factors, instead of `probability`.
         candidates: The factors that may be outliers. Default: "loop_closures".
-        types: Of these only the ones of these types, where any are given.
-        inliers: Factors that are trusted in any case: their places in the graph, from 0.
-        step: Factor from one μ to the next; the paper's is 1.4. Default: 2.0.
-        solver: Solves with the weights that are found at the end. Default: {"type": "auto", "stop":
-            {"max_iterations": 100, "relative_cost": 1e-08, "absolute_cost": 1e-20, "gradient": 1e-12,
-            "step": 1e-12}, "linear": {"method": "auto", "ordering": "auto", "refinements": 0,
-            "conjugate_gradients": {"preconditioner": "schur_jacobi", "tolerance": 1e-06,
-            "max_iterations": 1000}}}.
+        types: Restricts the candidates to these factor types. Default: no restriction.
+        inliers: Factors that are always trusted, by index in the graph, from 0.
+        step: Factor between consecutive values of μ; 1.4 in the paper. Default: 2.0.
+        solver: Solver for the final weights. Default: {"type": "auto", "stop": {"max_iterations": 100,
+            "relative_cost": 1e-08, "absolute_cost": 1e-20, "gradient": 1e-12, "step": 1e-12}, "linear":
+            {"method": "auto", "ordering": "auto", "refinements": 0, "conjugate_gradients":
+            {"preconditioner": "schur_jacobi", "tolerance": 1e-06, "max_iterations": 1000}}}.
     """
     return Solver("gnc", {"cost": cost, "probability": probability, "threshold": threshold, "candidates": candidates, "types": types, "inliers": inliers, "step": step, "solver": solver})
 
@@ -152,9 +156,9 @@ def levenberg_marquardt(
 ) -> Solver:
     """Damped steps, each of which lowers the cost: (H + λ diag H) δ = -g.
 
-    λ falls by up to `decrease` after a step that does what the model predicts, and rises after one that
-    does not (Nielsen's rule). A refused step costs a factorization, not a linearization. Nothing but
-    damping may hold a direction: the outcome then names it as undetermined.
+    λ follows Nielsen's rule: it falls by a factor of up to `decrease` after a step that agrees with the
+    model, and rises after other steps. A rejected step costs a factorization, not a linearization. If only
+    damping constrains a direction, the outcome reports it as undetermined.
 
     ```toml
     solver = { type = "levenberg_marquardt", initial_lambda = 1e-5, stop = { relative_cost = 1e-6 } }
@@ -162,15 +166,14 @@ def levenberg_marquardt(
 
     Args:
         initial_lambda: Damping of the first step, as a share of the diagonal. Default: 1e-05.
-        min_lambda: Least damping. Default: 1e-15.
-        max_lambda: Damping at which a solve gives up. Default: 1000000000000.0.
-        decrease: Largest factor by which one good step lowers the damping. Default: 10.0.
-        diagonal: Least and largest entry of the diagonal that is used for damping. Default: [1e-06,
-            1e+32].
-        stop: When to stop. Default: {"max_iterations": 100, "relative_cost": 1e-08, "absolute_cost":
+        min_lambda: Minimum damping. Default: 1e-15.
+        max_lambda: Maximum damping, at which a solve gives up. Default: 1000000000000.0.
+        decrease: Largest factor by which a successful step lowers the damping. Default: 10.0.
+        diagonal: Lower and upper bound of the diagonal entries for damping. Default: [1e-06, 1e+32].
+        stop: Stopping criteria. Default: {"max_iterations": 100, "relative_cost": 1e-08, "absolute_cost":
             1e-20, "gradient": 1e-12, "step": 1e-12}.
-        linear: How the linear system of each step is solved. Default: {"method": "auto", "ordering":
-            "auto", "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi",
-            "tolerance": 1e-06, "max_iterations": 1000}}.
+        linear: Solver of the linear system of each step. Default: {"method": "auto", "ordering": "auto",
+            "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi", "tolerance":
+            1e-06, "max_iterations": 1000}}.
     """
     return Solver("levenberg_marquardt", {"initial_lambda": initial_lambda, "min_lambda": min_lambda, "max_lambda": max_lambda, "decrease": decrease, "diagonal": diagonal, "stop": stop, "linear": linear})

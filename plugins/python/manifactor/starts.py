@@ -19,12 +19,14 @@ __all__ = [
 def chordal() -> Start:
     """Rotations from a linear relaxation of all relative measurements at once, then positions.
 
-    Takes between factors and priors of rotations and poses, with any noise; robust losses are not looked at.
-    A measurement's rotation weighs by the mean variance of its three angles, whatever the translation; then
-    positions minimise the full cost, rotations held. Held variables keep their values; a connected part
-    without any, and without a prior, keeps its first pose. Points are placed from where they were first seen,
-    anything else stays. Close to the best estimate where rotations are measured well, whatever the values
-    that came with the graph. It doubts a minimum in which the rotations of some loop go around once too often.
+    Uses between factors and priors of rotations and poses, with any noise; robust losses are ignored. The
+    rotation of a measurement is weighted by the mean variance of its three angles, independent of the
+    translation. The positions then minimize the full cost with the rotations held. Held variables keep their
+    values. A connected part without a held variable or prior keeps its first pose. Points are placed from
+    their first measurement; other variables keep their values.
+
+    The result is close to the optimum if rotations are measured well, independent of the given values. This
+    start also marks a minimum as doubtful if the rotations along some loop add up to extra turns.
 
     ```toml
     start = { type = "chordal" }
@@ -34,7 +36,7 @@ def chordal() -> Start:
 
 
 def given() -> Start:
-    """The values that came with the graph, as they are.
+    """The values from the graph's document, unchanged.
 
     ```toml
     start = { type = "given" }
@@ -44,17 +46,17 @@ def given() -> Start:
 
 
 def spanning_tree(*, tree: Literal['chain', 'shallow'] | None = None) -> Start:
-    """Variables placed one from the other along a spanning tree of the between factors.
+    """Variables placed one after another along a spanning tree of the between factors.
 
-    Begins in each connected part at the held variables, else at a prior, else at its first variable, which
-    keeps its value. Points are placed from where they were first seen; anything else stays.
+    Each connected part begins at its held variables, otherwise at a prior, otherwise at its first variable,
+    which keeps its value. Points are placed from their first measurement; other variables keep their values.
 
     ```toml
     start = { type = "spanning_tree", tree = "shallow" }
     ```
 
     Args:
-        tree: `chain`: along the odometry, where its factors come first. `shallow`: by as few factors as
+        tree: `chain` follows the odometry, if its factors come first. `shallow` uses as few factors as
             possible. Default: "chain".
     """
     return Start("spanning_tree", {"tree": tree})

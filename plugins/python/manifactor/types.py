@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any, Literal, Required, TypedDict
 
 from ._native import Noise
-from .chosen import Factor, Numbers
+from .chosen import Factor, Numbers, Solver
 
 
 class Camera(TypedDict, total=False):
@@ -20,7 +20,7 @@ class Camera(TypedDict, total=False):
     cx: Required[float]
     #: Principal point, in pixels.
     cy: Required[float]
-    #: How much y/z adds to u, in pixels.
+    #: Contribution of y/z to u, in pixels.
     skew: float
     #: Size of the image, in pixels.
     width: Required[int]
@@ -29,21 +29,21 @@ class Camera(TypedDict, total=False):
 
 
 class Component(TypedDict, total=False):
-    """One of the things that it may be."""
+    """One alternative of a mixture."""
 
-    #: How likely it is, relative to the others.
+    #: Likelihood relative to the remaining components.
     weight: Required[float]
-    #: The factor that holds then. Default: none.
+    #: Factor of this alternative. Default: none.
     factor: Factor | None
-    #: Which of the mixture's variables the factor is over, in its order: places among `keys`, from 0.
-    #: Default: all of them.
+    #: Variables that the factor uses, as indices into `keys` from 0, in the order of the factor. Default: all
+    #: of them.
     over: Numbers
-    #: What the factor's residual is measured in.
+    #: Noise model of the factor's residual.
     noise: Noise
 
 
 class RadialTangential(TypedDict, total=False):
-    """A camera whose lens bends the image along and across the radius, with five coefficients."""
+    """A camera with radial and tangential lens distortion, with five coefficients."""
 
     #: Focal length along x, in pixels.
     fx: Required[float]
@@ -57,14 +57,14 @@ class RadialTangential(TypedDict, total=False):
     width: Required[int]
     #: Size of the image, in pixels.
     height: Required[int]
-    #: Coefficients k₁, k₂, p₁, p₂, k₃, in the order of OpenCV.
+    #: Coefficients k₁, k₂, p₁, p₂, k₃, in OpenCV's order.
     distortion: Required[Numbers]
 
 
 class Stopping(TypedDict, total=False):
-    """When to stop."""
+    """Stopping criteria."""
 
-    #: Most linearizations.
+    #: Maximum number of linearizations.
     max_iterations: int
     #: Stop once a step changes the cost by less than this share of it.
     relative_cost: float
@@ -77,28 +77,29 @@ class Stopping(TypedDict, total=False):
 
 
 class LinearSolver(TypedDict, total=False):
-    """How the linear system of each step is solved."""
+    """Solver of the linear system of each step."""
 
     #: The method.
     method: Literal['auto', 'cholesky', 'dense', 'qr', 'conjugate_gradients']
-    #: The order of elimination.
+    #: The elimination order.
     ordering: Literal['auto', 'natural', 'amd', 'colamd', 'nested_dissection'] | Any
-    #: Most steps of iterative refinement after each solve, by Cholesky: each brings the residual of a badly
-    #: conditioned system down, for the time of a solve. They end once a correction is more than half of the
-    #: one before: what is left is rounding.
+    #: Maximum number of steps of iterative refinement after each solve, for Cholesky. Each step reduces the
+    #: residual of a badly conditioned system, and takes the time of a solve. Refinement stops if a correction
+    #: is more than half of the previous one, as rounding then dominates.
     refinements: int
-    #: When conjugate gradients stop, and what they are preconditioned by.
+    #: Stopping criteria and preconditioner of conjugate gradients.
     conjugate_gradients: ConjugateGradients
-    #: Most memory that the factor may take, in GiB; what the system has available, where it is not given.
+    #: Maximum memory of the factor, in GiB. Default: the available memory of the system.
     memory_gib: float
 
 
 class ConjugateGradients(TypedDict, total=False):
-    """When to stop iterating, and how to precondition."""
+    """Stopping criteria and preconditioner of conjugate gradients."""
 
-    #: What the preconditioner knows.
+    #: The preconditioner.
     preconditioner: Literal['block_jacobi', 'schur_jacobi']
     #: Stop once the residual is this share of the right-hand side, in the preconditioner's norm.
     tolerance: float
-    #: Most iterations; the step is then the best found, which lowers the quadratic model all the same.
+    #: Maximum number of iterations. The step is then the best one so far, which still lowers the quadratic
+    #: model.
     max_iterations: int

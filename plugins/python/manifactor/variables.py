@@ -30,13 +30,14 @@ __all__ = [
 class BalCamera(Variable):
     """A camera of unknown pose, focal length and radial distortion, as in bundle adjustment in the large (BAL).
 
-    It looks along its own -z; x is right and y up in the image, and the origin is the image's centre. A point P
-    of its frame is seen at f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p, p = -(Px, Py) / Pz, in pixels (Agarwal et al., Bundle
-    Adjustment in the Large, ECCV 2010). The pose takes points from the camera's frame to the world's, as all
-    poses here do; files have its inverse.
+    The camera looks along the negative z axis of its frame; x is right and y up in the image, with the origin
+    at the image centre. A point P in the camera's frame projects to f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p with
+    p = -(Px, Py) / Pz, in pixels (Agarwal et al., Bundle Adjustment in the Large, ECCV 2010). The pose maps
+    points from the camera's frame to the world frame, as all poses in this library do; BAL files store its
+    inverse.
 
-    Tangent (rx, ry, rz, x, y, z, f, k1, k2): the pose steps by X·Exp(δ), in the camera's own frame, so that it turns
-    about its own centre; the others add.
+    Tangent (rx, ry, rz, x, y, z, f, k1, k2). The pose steps by X·Exp(δ) in the camera's frame, so a rotation
+    turns the camera about its own centre; f, k1 and k2 are additive.
 
     ```toml
     [values]
@@ -44,12 +45,12 @@ class BalCamera(Variable):
     ```
 
     Args:
-        translation: Its centre, in the world's frame; in the unit of the points.
-        rotation: Unit quaternion (x, y, z, w); turns directions of the camera's frame into those of the
-            world's.
+        translation: Camera centre in the world frame, in the unit of the points.
+        rotation: Unit quaternion (x, y, z, w) that rotates directions from the camera's frame to the
+            world frame.
         focal_length: Focal length, in pixels.
-        k1: Radial distortion by the second power of the distance from the centre.
-        k2: Radial distortion by the fourth power of the distance from the centre.
+        k1: Radial distortion: the coefficient of the second power of the distance from the centre.
+        k2: Radial distortion: the coefficient of the fourth power of the distance from the centre.
     """
 
     TYPE: ClassVar[str] = "bal_camera"
@@ -69,12 +70,12 @@ class BalCamera(Variable):
 
     @property
     def translation(self) -> NDArray[np.float64]:
-        """Its centre, in the world's frame; in the unit of the points."""
+        """Camera centre in the world frame, in the unit of the points."""
         return self.__getattr__("translation")  # type: ignore[no-any-return]
 
     @property
     def rotation(self) -> NDArray[np.float64]:
-        """Unit quaternion (x, y, z, w); turns directions of the camera's frame into those of the world's."""
+        """Unit quaternion (x, y, z, w) that rotates directions from the camera's frame to the world frame."""
         return self.__getattr__("rotation")  # type: ignore[no-any-return]
 
     @property
@@ -84,22 +85,22 @@ class BalCamera(Variable):
 
     @property
     def k1(self) -> float:
-        """Radial distortion by the second power of the distance from the centre."""
+        """Radial distortion: the coefficient of the second power of the distance from the centre."""
         return self.__getattr__("k1")  # type: ignore[no-any-return]
 
     @property
     def k2(self) -> float:
-        """Radial distortion by the fourth power of the distance from the centre."""
+        """Radial distortion: the coefficient of the fourth power of the distance from the centre."""
         return self.__getattr__("k2")  # type: ignore[no-any-return]
 
 
 class DualQuadric(Variable):
     """An object as an ellipsoid: Q* = Z diag(a², b², c², -1) Zᵀ with the pose Z.
 
-    Tangent (rx, ry, rz, x, y, z, log_a, log_b, log_c): the pose steps by Z·Exp(δ), in its own frame,
-    the semi-axes by s·exp(δ). So they stay positive, whatever step a solver takes; a step that would
-    leave 1e-9 to 1e9 metres stops there. Turning the ellipsoid about its own axis by half a turn, or
-    permuting its axes, describes the same body by another point of the manifold.
+    Tangent (rx, ry, rz, x, y, z, log_a, log_b, log_c): the pose steps by Z·Exp(δ) in the local frame, the
+    semi-axes by s·exp(δ). The semi-axes therefore stay positive for any step; they are clamped to 1e-9 to 1e9
+    metres. Rotating the ellipsoid about a principal axis by half a turn, or permuting its axes, describes one
+    body by different points of the manifold.
 
     ```toml
     [values]
@@ -107,9 +108,9 @@ class DualQuadric(Variable):
     ```
 
     Args:
-        translation: Its centre, in metres.
+        translation: Centre, in metres.
         rotation: Unit quaternion (x, y, z, w).
-        semi_axes: Half the extents along its own axes, in metres: three numbers from 1e-9 to 1e9.
+        semi_axes: Half the extents along the local axes, in metres: three numbers from 1e-9 to 1e9.
     """
 
     TYPE: ClassVar[str] = "dual_quadric"
@@ -121,7 +122,7 @@ class DualQuadric(Variable):
 
     @property
     def translation(self) -> NDArray[np.float64]:
-        """Its centre, in metres."""
+        """Centre, in metres."""
         return self.__getattr__("translation")  # type: ignore[no-any-return]
 
     @property
@@ -131,7 +132,7 @@ class DualQuadric(Variable):
 
     @property
     def semi_axes(self) -> NDArray[np.float64]:
-        """Half the extents along its own axes, in metres: three numbers from 1e-9 to 1e9."""
+        """Half the extents along the local axes, in metres: three numbers from 1e-9 to 1e9."""
         return self.__getattr__("semi_axes")  # type: ignore[no-any-return]
 
     @property
@@ -141,20 +142,20 @@ class DualQuadric(Variable):
 
     @property
     def major_axis(self) -> Any:
-        """In formulas: The direction of the longest semi-axis, the first of equals; its sign means nothing."""
+        """In formulas: The unit direction of the longest semi-axis, the first of equal ones. Its sign is arbitrary."""
         return in_formulas(self, "major_axis")
 
     @property
     def pose(self) -> Any:
-        """In formulas: The pose of an object, from its own frame to the outer one."""
+        """In formulas: The pose of an object, from its local frame to the outer one."""
         return in_formulas(self, "pose")
 
 
 class Plane(Variable):
     """A plane in Hessian normal form, S² × R: the points x with n · x = offset.
 
-    Tangent (a, b, offset): the normal n turns as an `s2` does, the offset adds. n points to the side where things stand;
-    (n, offset) and (-n, -offset) are the same points, seen from the two sides.
+    Tangent (a, b, offset): the normal n steps like an `s2`, the offset is additive. n points to the side on
+    which objects stand; (n, offset) and (-n, -offset) contain the same points, with opposite sides.
 
     ```toml
     [values]
@@ -162,8 +163,8 @@ class Plane(Variable):
     ```
 
     Args:
-        normal: The side where things stand, of any length but zero.
-        offset: How far it is from the origin along its normal, in metres.
+        normal: Normal, pointing to the side on which objects stand; of any length but zero.
+        offset: Distance from the origin along the normal, in metres.
     """
 
     TYPE: ClassVar[str] = "plane"
@@ -175,12 +176,12 @@ class Plane(Variable):
 
     @property
     def normal(self) -> NDArray[np.float64]:
-        """The side where things stand, of any length but zero."""
+        """Normal, pointing to the side on which objects stand; of any length but zero."""
         return self.__getattr__("normal")  # type: ignore[no-any-return]
 
     @property
     def offset(self) -> float:
-        """How far it is from the origin along its normal, in metres."""
+        """Distance from the origin along the normal, in metres."""
         return self.__getattr__("offset")  # type: ignore[no-any-return]
 
 
@@ -212,22 +213,22 @@ class Point1(Variable):
 
     @property
     def abs(self) -> Any:
-        """In formulas: The absolute value. At zero it has a kink; the derivative taken there is that of a > 0."""
+        """In formulas: The absolute value. It has a kink at zero; the derivative for a > 0 is used there."""
         return in_formulas(self, "abs")
 
     @property
     def acos(self) -> Any:
-        """In formulas: The angle of a cosine, in radians. Its derivative at ±1 is infinite: `angle(a, b)` has no such place but 0 and π."""
+        """In formulas: The arccosine, in radians. Its derivative at ±1 is infinite; `angle(a, b)` has kinks only at 0 and π."""
         return in_formulas(self, "acos")
 
     @property
     def asin(self) -> Any:
-        """In formulas: The angle of a sine, in radians. Its derivative at ±1 is infinite."""
+        """In formulas: The arcsine, in radians. Its derivative at ±1 is infinite."""
         return in_formulas(self, "asin")
 
     @property
     def atan(self) -> Any:
-        """In formulas: The angle of a tangent, in radians."""
+        """In formulas: The arctangent, in radians."""
         return in_formulas(self, "atan")
 
     @property
@@ -237,7 +238,7 @@ class Point1(Variable):
 
     @property
     def exp(self) -> Any:
-        """In formulas: The exponential."""
+        """In formulas: The exponential function."""
         return in_formulas(self, "exp")
 
     @property
@@ -247,7 +248,7 @@ class Point1(Variable):
 
     @property
     def rotation(self) -> Any:
-        """In formulas: The rotation by an angle in radians, counter-clockwise."""
+        """In formulas: The rotation by `angle`, in radians, counter-clockwise."""
         return in_formulas(self, "rotation")
 
     @property
@@ -267,7 +268,7 @@ class Point1(Variable):
 
     @property
     def wrap(self) -> Any:
-        """In formulas: The same angle within -π..π, in radians."""
+        """In formulas: The angle wrapped to -π..π, in radians."""
         return in_formulas(self, "wrap")
 
 
@@ -299,27 +300,27 @@ class Point2(Variable):
 
     @property
     def largest(self) -> Any:
-        """In formulas: The greatest component, the first of equals."""
+        """In formulas: The largest component, the first of equal ones."""
         return in_formulas(self, "largest")
 
     @property
     def norm(self) -> Any:
-        """In formulas: The length. At zero it has a kink; the derivative taken there is zero."""
+        """In formulas: The length. It has a kink at zero; the derivative returned there is zero."""
         return in_formulas(self, "norm")
 
     @property
     def norm_squared(self) -> Any:
-        """In formulas: The sum of the squares."""
+        """In formulas: The squared length."""
         return in_formulas(self, "norm_squared")
 
     @property
     def smallest(self) -> Any:
-        """In formulas: The least component, the first of equals."""
+        """In formulas: The smallest component, the first of equal ones."""
         return in_formulas(self, "smallest")
 
     @property
     def unit(self) -> Any:
-        """In formulas: The vector, one long."""
+        """In formulas: The vector, normalized to length one."""
         return in_formulas(self, "unit")
 
     @property
@@ -366,7 +367,7 @@ class Point3(Variable):
 
     @property
     def largest(self) -> Any:
-        """In formulas: The greatest component, the first of equals."""
+        """In formulas: The largest component, the first of equal ones."""
         return in_formulas(self, "largest")
 
     @property
@@ -376,32 +377,32 @@ class Point3(Variable):
 
     @property
     def norm(self) -> Any:
-        """In formulas: The length. At zero it has a kink; the derivative taken there is zero."""
+        """In formulas: The length. It has a kink at zero; the derivative returned there is zero."""
         return in_formulas(self, "norm")
 
     @property
     def norm_squared(self) -> Any:
-        """In formulas: The sum of the squares."""
+        """In formulas: The squared length."""
         return in_formulas(self, "norm_squared")
 
     @property
     def project(self) -> Any:
-        """In formulas: Where a point is seen, in the frame of a camera that looks along z: (x, y)/z."""
+        """In formulas: The projection (x, y)/z of a point in the frame of a camera that looks along z."""
         return in_formulas(self, "project")
 
     @property
     def rotation(self) -> Any:
-        """In formulas: The rotation about a vector by its length, in radians."""
+        """In formulas: The rotation about the vector `omega` by its length, in radians."""
         return in_formulas(self, "rotation")
 
     @property
     def smallest(self) -> Any:
-        """In formulas: The least component, the first of equals."""
+        """In formulas: The smallest component, the first of equal ones."""
         return in_formulas(self, "smallest")
 
     @property
     def unit(self) -> Any:
-        """In formulas: The vector, one long."""
+        """In formulas: The vector, normalized to length one."""
         return in_formulas(self, "unit")
 
     @property
@@ -421,11 +422,11 @@ class Point3(Variable):
 
 
 class S2(Variable):
-    """A direction in space, such as gravity's: a point on the unit sphere.
+    """A direction in space, such as gravity: a point on the unit sphere.
 
-    Tangent (a, b): along two axes perpendicular to the direction n, B(n) = [b₁ b₂] of Duff et al., *Building an
-    Orthonormal Basis, Revisited* (2017). n ⊞ δ = cos|δ| n + sin|δ|/|δ| B δ, the great circle that leaves n towards B δ. The
-    opposite of n is half a turn away in every direction: `local` takes the first.
+    Tangent (a, b): along two axes perpendicular to the direction n, B(n) = [b₁ b₂] of Duff et al., *Building
+    an Orthonormal Basis, Revisited* (2017). n ⊞ δ = cos|δ| n + sin|δ|/|δ| B δ, the great circle from n
+    towards B δ. The opposite of n is half a turn away in every direction; `local` uses the first axis.
 
     ```toml
     [values]
@@ -433,7 +434,7 @@ class S2(Variable):
     ```
 
     Args:
-        direction: Where it points, of any length but zero.
+        direction: Direction vector, of any length but zero.
     """
 
     TYPE: ClassVar[str] = "s2"
@@ -445,7 +446,7 @@ class S2(Variable):
 
     @property
     def direction(self) -> NDArray[np.float64]:
-        """Where it points, of any length but zero."""
+        """Direction vector, of any length but zero."""
         return self.__getattr__("direction")  # type: ignore[no-any-return]
 
     @property
@@ -455,7 +456,7 @@ class S2(Variable):
 
     @property
     def largest(self) -> Any:
-        """In formulas: The greatest component, the first of equals."""
+        """In formulas: The largest component, the first of equal ones."""
         return in_formulas(self, "largest")
 
     @property
@@ -465,32 +466,32 @@ class S2(Variable):
 
     @property
     def norm(self) -> Any:
-        """In formulas: The length. At zero it has a kink; the derivative taken there is zero."""
+        """In formulas: The length. It has a kink at zero; the derivative returned there is zero."""
         return in_formulas(self, "norm")
 
     @property
     def norm_squared(self) -> Any:
-        """In formulas: The sum of the squares."""
+        """In formulas: The squared length."""
         return in_formulas(self, "norm_squared")
 
     @property
     def project(self) -> Any:
-        """In formulas: Where a point is seen, in the frame of a camera that looks along z: (x, y)/z."""
+        """In formulas: The projection (x, y)/z of a point in the frame of a camera that looks along z."""
         return in_formulas(self, "project")
 
     @property
     def rotation(self) -> Any:
-        """In formulas: The rotation about a vector by its length, in radians."""
+        """In formulas: The rotation about the vector `omega` by its length, in radians."""
         return in_formulas(self, "rotation")
 
     @property
     def smallest(self) -> Any:
-        """In formulas: The least component, the first of equals."""
+        """In formulas: The smallest component, the first of equal ones."""
         return in_formulas(self, "smallest")
 
     @property
     def unit(self) -> Any:
-        """In formulas: The vector, one long."""
+        """In formulas: The vector, normalized to length one."""
         return in_formulas(self, "unit")
 
     @property
@@ -510,10 +511,9 @@ class S2(Variable):
 
 
 class Se2(Variable):
-    """A pose in the plane, X·Exp(v, θ): tangent (x, y, theta), in metres and radians, in its own frame.
+    """A pose in the plane, X·Exp(v, θ): tangent (x, y, theta), in metres and radians, in the local frame.
 
-    It takes points from its own (local) frame to the outer one: R p + t. The angle is in radians,
-    counter-clockwise.
+    It maps points from the local frame to the outer one: R p + t. The angle is in radians, counter-clockwise.
 
     ```toml
     [values]
@@ -521,8 +521,8 @@ class Se2(Variable):
     ```
 
     Args:
-        translation: Its position, in metres.
-        angle: In radians, counter-clockwise.
+        translation: Position, in metres.
+        angle: Angle in radians, counter-clockwise.
     """
 
     TYPE: ClassVar[str] = "se2"
@@ -534,40 +534,40 @@ class Se2(Variable):
 
     @property
     def translation(self) -> NDArray[np.float64]:
-        """Its position, in metres."""
+        """Position, in metres."""
         return self.__getattr__("translation")  # type: ignore[no-any-return]
 
     @property
     def angle(self) -> float:
-        """In radians, counter-clockwise."""
+        """Angle in radians, counter-clockwise."""
         return self.__getattr__("angle")  # type: ignore[no-any-return]
 
     @property
     def inverse(self) -> Any:
-        """In formulas: The outer frame, seen from x: `inverse(x) * p` is a point, seen from x."""
+        """In formulas: The inverse pose: `inverse(x) * p` is the point p in the frame of x."""
         return in_formulas(self, "inverse")
 
     @property
     def log(self) -> Any:
-        """In formulas: The tangent vector (v, θ) that leads from the outer frame to the pose."""
+        """In formulas: The tangent vector (v, θ) from the identity to the pose."""
         return in_formulas(self, "log")
 
     @property
     def position(self) -> Any:
-        """In formulas: Where a pose is."""
+        """In formulas: The position of a pose."""
         return in_formulas(self, "position")
 
     @property
     def rotation(self) -> Any:
-        """In formulas: Which way a pose is turned."""
+        """In formulas: The rotation of a pose."""
         return in_formulas(self, "rotation")
 
 
 class Se3(Variable):
-    """A pose in space, X·Exp(ω, v): tangent (rx, ry, rz, x, y, z), in radians and metres, in its own frame.
+    """A pose in space, X·Exp(ω, v): tangent (rx, ry, rz, x, y, z), in radians and metres, in the local frame.
 
-    It takes points from its own (local) frame to the outer one: R p + t. The rotation is a unit
-    quaternion (x, y, z, w).
+    It maps points from the local frame to the outer one: R p + t. The rotation is a unit quaternion (x, y, z,
+    w).
 
     ```toml
     [values]
@@ -575,7 +575,7 @@ class Se3(Variable):
     ```
 
     Args:
-        translation: Its position, in metres.
+        translation: Position, in metres.
         rotation: Unit quaternion (x, y, z, w).
     """
 
@@ -588,7 +588,7 @@ class Se3(Variable):
 
     @property
     def translation(self) -> NDArray[np.float64]:
-        """Its position, in metres."""
+        """Position, in metres."""
         return self.__getattr__("translation")  # type: ignore[no-any-return]
 
     @property
@@ -598,24 +598,24 @@ class Se3(Variable):
 
     @property
     def inverse(self) -> Any:
-        """In formulas: The outer frame, seen from x: `inverse(x) * p` is a point, seen from x."""
+        """In formulas: The inverse pose: `inverse(x) * p` is the point p in the frame of x."""
         return in_formulas(self, "inverse")
 
     @property
     def log(self) -> Any:
-        """In formulas: The tangent vector (ω, v) that leads from the outer frame to the pose."""
+        """In formulas: The tangent vector (ω, v) from the identity to the pose."""
         return in_formulas(self, "log")
 
     @property
     def position(self) -> Any:
-        """In formulas: Where a pose is."""
+        """In formulas: The position of a pose."""
         return in_formulas(self, "position")
 
 
 class So2(Variable):
     """A rotation in the plane: tangent (theta), in radians, counter-clockwise.
 
-    The angle is kept within -π..π. The logarithm is that angle: it jumps from one end to the other.
+    The angle is in -π..π. The logarithm is this angle and jumps from one end to the other.
 
     ```toml
     [values]
@@ -623,7 +623,7 @@ class So2(Variable):
     ```
 
     Args:
-        angle: In radians, counter-clockwise.
+        angle: Angle in radians, counter-clockwise.
     """
 
     TYPE: ClassVar[str] = "so2"
@@ -635,30 +635,30 @@ class So2(Variable):
 
     @property
     def angle(self) -> float:
-        """In radians, counter-clockwise."""
+        """Angle in radians, counter-clockwise."""
         return self.__getattr__("angle")  # type: ignore[no-any-return]
 
     @property
     def inverse(self) -> Any:
-        """In formulas: The rotation back."""
+        """In formulas: The inverse rotation."""
         return in_formulas(self, "inverse")
 
     @property
     def x_axis(self) -> Any:
-        """In formulas: The x axis, turned."""
+        """In formulas: The x axis of the rotated frame."""
         return in_formulas(self, "x_axis")
 
     @property
     def y_axis(self) -> Any:
-        """In formulas: The y axis, turned."""
+        """In formulas: The y axis of the rotated frame."""
         return in_formulas(self, "y_axis")
 
 
 class So3(Variable):
-    """A rotation in space, R·Exp(ω): tangent (rx, ry, rz), in radians, about its own axes.
+    """A rotation in space, R·Exp(ω): tangent (rx, ry, rz), in radians, about the axes of the rotated frame.
 
-    Read from a quaternion (x, y, z, w) of length 1 to within 0.001, and normalised. The logarithm is
-    the shortest rotation vector; at an angle of exactly π it has two, and a jump between them.
+    Read from a quaternion (x, y, z, w) of length 1 to within 0.001, and normalized. The logarithm is the
+    shortest rotation vector. At an angle of exactly π there are two of them, and the logarithm jumps.
 
     ```toml
     [values]
@@ -683,32 +683,32 @@ class So3(Variable):
 
     @property
     def inverse(self) -> Any:
-        """In formulas: The rotation back."""
+        """In formulas: The inverse rotation."""
         return in_formulas(self, "inverse")
 
     @property
     def log(self) -> Any:
-        """In formulas: The rotation vector, shorter than half a turn, in radians."""
+        """In formulas: The shortest rotation vector, of length π at most, in radians."""
         return in_formulas(self, "log")
 
     @property
     def x_axis(self) -> Any:
-        """In formulas: The x axis, turned."""
+        """In formulas: The x axis of the rotated frame."""
         return in_formulas(self, "x_axis")
 
     @property
     def y_axis(self) -> Any:
-        """In formulas: The y axis, turned."""
+        """In formulas: The y axis of the rotated frame."""
         return in_formulas(self, "y_axis")
 
     @property
     def z_axis(self) -> Any:
-        """In formulas: The z axis, turned."""
+        """In formulas: The z axis of the rotated frame."""
         return in_formulas(self, "z_axis")
 
 
 class Twist(Variable):
-    """The velocity of a rigid body in its own frame: angular in rad/s, then linear in m/s.
+    """The velocity of a rigid body in the body frame: angular in rad/s, then linear in m/s.
 
     Tangent (wx, wy, wz, vx, vy, vz); x ⊞ δ = x + δ.
 

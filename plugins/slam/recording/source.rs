@@ -237,13 +237,13 @@ mod tests {
 
     #[test]
     fn data_sets_are_found_one_folder_deep() {
-        let data = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let folders = InputFolders { data: Some(data.parent().unwrap().to_owned()), document: data.into() };
-        assert_eq!(folders.data_set(Path::new("settings")).unwrap(), data.join("settings"));
-        let found = folders.data_set(Path::new("gravity")).unwrap();
-        assert_eq!(found, data.join("gravity"));
-        let deep = InputFolders { document: "elsewhere".into(), ..folders };
-        assert!(deep.data_set(Path::new("slam")).unwrap().ends_with("slam"));
-        assert!(deep.data_set(Path::new("semantics")).unwrap().ends_with("slam/semantics"));
+        let root = tempfile::tempdir().unwrap();
+        let [runs, data] = ["runs", "data"].map(|name| root.path().join(name));
+        let sets = [runs.join("beside"), data.join("direct"), data.join("group/deep")];
+        sets.iter().for_each(|set| std::fs::create_dir_all(set).unwrap());
+        let folders = InputFolders { data: Some(data), document: runs };
+        for (name, set) in ["beside", "direct", "deep"].iter().zip(&sets) {
+            assert_eq!(&folders.data_set(Path::new(name)).unwrap(), set);
+        }
     }
 }

@@ -157,7 +157,7 @@ fn a_signal_ends_the_drawing_of_pictures() {
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let plot = AtWork::begin(&format!("plot {} --out {plots}", path(&folder, "run")));
     let mut writer = std::fs::File::options().write(true).open(&pipe).unwrap();
-    let plot = plot.signal("-INT").until("interrupted: ending", 0);
+    let plot = plot.signal("-INT").until("interrupted: writing the results so far", 0);
     writer.write_all(&record).unwrap();
     drop(writer);
     let ran = plot.end().ended(130);

@@ -74,6 +74,7 @@ fn canonical(node: &Node) -> String {
         Value::Null => "null".to_owned(),
         Value::Bool(value) => value.to_string(),
         Value::Integer(value) => value.to_string(),
+        Value::Unsigned(value) => value.to_string(),
         Value::Float(value) if value.fract() == 0.0 && value.abs() < MAX_EXACT_INTEGER => {
             (*value as i64).to_string()
         }
