@@ -279,7 +279,7 @@ impl<F: Kernel> Batch for BatchOf<F> {
             let mut work = std::mem::take(&mut self.work);
             let mut total = Evaluation::default();
             threads::run_in_pool(&mut || {
-                total = self.linearize_together(columns, &mut active, &mut work, to)
+                total = self.linearize_together(columns, &mut active, &mut work, to);
             });
             self.work = work;
             total

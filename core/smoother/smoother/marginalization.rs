@@ -144,7 +144,7 @@ impl Smoother {
                     self.model.removed.factors.insert(u64::from(number));
                 }
                 UndoStep::Undetermined(variable, was_undetermined) => {
-                    _ = self.model.set_undetermined(variable, was_undetermined)
+                    _ = self.model.set_undetermined(variable, was_undetermined);
                 }
             }
         }

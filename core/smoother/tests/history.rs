@@ -173,7 +173,7 @@ impl History {
                 allowed(self.smoother.remove(&[id]));
             }
             Change::SetWeight(f, weight) if m > 0 => {
-                allowed(self.smoother.set_weight(self.ids[f % m], weight))
+                allowed(self.smoother.set_weight(self.ids[f % m], weight));
             }
             Change::Replace(f) if m > 0 => {
                 let mut entry = self.smoother.entry(self.ids[f % m])?.clone();

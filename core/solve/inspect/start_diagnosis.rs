@@ -67,7 +67,7 @@ impl Problem {
         if is_sound && self.dim() > 0 && self.model.variables.len() <= MAX_ANALYSED_VARIABLES {
             match self.factorized() {
                 Ok(mut system) => {
-                    found.weak = system.weakest().filter(|weak| weak.condition > WEAK_CONDITION)
+                    found.weak = system.weakest().filter(|weak| weak.condition > WEAK_CONDITION);
                 }
                 Err(CovarianceError::Indeterminate(open)) => found.undetermined = Some(open),
                 Err(_) => {}

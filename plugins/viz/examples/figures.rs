@@ -5,6 +5,7 @@
 //! cargo run --release -p manifactor-viz --example figures -- losses    # some
 //! ```
 //! The table in `docs/figures/README.md` has all names. The documents of the runs are in `examples/figures`.
+#![allow(clippy::print_stdout)]
 use manifactor_config::Document;
 use manifactor_geometry::{Between, Prior, Se2, Se3, So2};
 use manifactor_graph::loss::{Cauchy, ErasedLoss, GemanMcClure, Huber, L2, Tukey};

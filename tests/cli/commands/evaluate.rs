@@ -51,7 +51,11 @@ fn boxes_that_do_not_meet_are_an_error() {
     let folder = folder(&[("one.csv", &one), ("other.csv", &other)]);
     let (one, other) = (path(&folder, "one.csv"), path(&folder, "other.csv"));
     let ran = manifactor(&format!("evaluate --boxes {one} {one}")).ended(0);
-    assert!(ran.stdout.contains("1 box, 1 true object, 0 estimated objects with 3 boxes or more"), "{}", ran.stdout);
+    assert!(
+        ran.stdout.contains("1 box, 1 true object, 0 estimated objects with 3 boxes or more"),
+        "{}",
+        ran.stdout
+    );
     manifactor(&format!("evaluate --boxes {one} {other}"))
         .ended(2)
         .complains("are time stamps and sides written alike?");

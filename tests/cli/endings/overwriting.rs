@@ -42,7 +42,7 @@ fn a_file_is_not_written_over_unless_forced() {
     let (graph, other) = (path(&folder, "a.g2o"), path(&folder, "b.json"));
     let text = |path: &str| fs::read_to_string(path).unwrap();
     for out in [&graph, &path(&folder, "./a.g2o")] {
-        manifactor(&format!("solve {graph} --out {out}")).ended(2).complains("is the graph itself");
+        manifactor(&format!("solve {graph} --out {out}")).ended(2).complains("is the input graph");
     }
     manifactor(&format!("solve {graph} --out {other}")).ended(2).complains("exists already");
     assert_eq!((text(&graph), text(&other)), (GRAPH.to_owned(), "precious".to_owned()));
@@ -84,7 +84,7 @@ fn a_folder_of_other_files_is_refused_before_any_work() {
         fs::write(out.join("odometry.txt"), "a recording of years").unwrap();
         let ran = into(&folder, command, &out, "-vv").ended(2);
         ran.complains("has not written, such as odometry.txt");
-        ran.complains("--force writes into this one");
+        ran.complains("write into this one with --force");
         assert!(!ran.stderr.contains("compiled"), "{}", ran.stderr);
         assert_eq!(names(&out), ["odometry.txt"]);
         assert_eq!(fs::read_to_string(out.join("odometry.txt")).unwrap(), "a recording of years");
