@@ -152,7 +152,7 @@ const TAKEN: [&str; 15] = [
 
 /// Crate names that would clash: crates of Rust, of the workspace and of a plugin's manifest, and the build
 /// script.
-const CRATES: [&str; 26] = [
+const CRATES: [&str; 34] = [
     "alloc",
     "build",
     "core",
@@ -162,18 +162,26 @@ const CRATES: [&str; 26] = [
     "schemars",
     "serde",
     "manifactor",
+    "manifactor_association",
     "manifactor_bench",
     "manifactor_cli",
     "manifactor_config",
     "manifactor_document",
+    "manifactor_experiment",
     "manifactor_expression",
     "manifactor_formats",
     "manifactor_fuzz",
     "manifactor_geometry",
     "manifactor_graph",
+    "manifactor_mapping",
+    "manifactor_metrics",
+    "manifactor_online",
     "manifactor_python",
     "manifactor_quadric",
+    "manifactor_recording",
+    "manifactor_run",
     "manifactor_semantic",
+    "manifactor_simulator",
     "manifactor_slam",
     "manifactor_smoother",
     "manifactor_solve",
