@@ -16,12 +16,14 @@ pub fn is_sequential(variables: impl IntoIterator<Item = (usize, u64)>) -> bool 
 }
 
 /// Returns the factors by the variables that they connect, in ascending order of the variables. Factors of a single variable are left
-/// out.
-pub fn by_variables<V: Ord, F>(factors: impl IntoIterator<Item = (Vec<V>, F)>) -> BTreeMap<Vec<V>, Vec<F>> {
-    let mut all: BTreeMap<Vec<V>, Vec<F>> = BTreeMap::new();
+/// out. A key is a list of variables, such as a `Vec` or a `SmallVec`.
+pub fn by_variables<V: Ord, K: AsMut<[V]> + Ord, F>(
+    factors: impl IntoIterator<Item = (K, F)>,
+) -> BTreeMap<K, Vec<F>> {
+    let mut all: BTreeMap<K, Vec<F>> = BTreeMap::new();
     for (mut variables, factor) in factors {
-        if variables.len() > 1 {
-            variables.sort_unstable();
+        if variables.as_mut().len() > 1 {
+            variables.as_mut().sort_unstable();
             all.entry(variables).or_default().push(factor);
         }
     }

@@ -1,12 +1,12 @@
 //! Registry of graph file formats by name; each format is one source file.
 //!
 //! ```
-//! use manifactor_formats::{FormatError, GraphFormat, GraphRead, Reading, register_graph_format};
+//! use manifactor_formats::{FormatError, GraphFormat, GraphRead, ReadOptions, register_graph_format};
 //! use manifactor_graph::{Graph, Values};
 //! use std::path::Path;
 //!
-//! fn parse(text: &str, path: &Path, reading: Reading) -> Result<GraphRead, FormatError> {
-//!     # let _ = (text, path, reading);
+//! fn parse(text: &str, path: &Path, options: ReadOptions) -> Result<GraphRead, FormatError> {
+//!     # let _ = (text, path, options);
 //!     Ok(GraphRead::default())
 //! }
 //! register_graph_format!(GraphFormat {
@@ -18,7 +18,7 @@
 //! });
 //!
 //! fn main() {
-//!     let format = GraphFormat::of(Path::new("a.nothing"), "").map(|format| format.name);
+//!     let format = GraphFormat::detect(Path::new("a.nothing"), "").map(|format| format.name);
 //!     assert_eq!(format, Some("nothing"));
 //! }
 //! ```

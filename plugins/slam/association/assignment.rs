@@ -12,7 +12,7 @@ const GAIN_RESOLUTION: f64 = 1e-6;
 /// column of each row.
 ///
 /// ```
-/// use manifactor_slam::association::best_assignment;
+/// use manifactor_association::best_assignment;
 ///
 /// let gains = [(0, 0, 3.0), (0, 1, 2.5), (1, 0, 2.8)];
 /// assert_eq!(best_assignment(2, 2, &gains), [Some(1), Some(0)]);

@@ -1,6 +1,7 @@
 //! Selection of the factors that may be outliers.
 use crate::odometry::{by_variables, is_sequential};
 use crate::problem::{Problem, ProblemFactor};
+use manifactor_graph::VariableIndices;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +22,8 @@ pub enum Candidates {
 impl Candidates {
     /// Returns for each factor whether it is a candidate.
     pub(crate) fn of(self, problem: &Problem) -> Vec<bool> {
-        let all = problem.model.factors.iter().map(|factor| (factor.variables.to_vec(), ()));
+        let all =
+            problem.model.factors.iter().map(|factor| (VariableIndices::from_slice(&factor.variables), ()));
         let connections = by_variables(all);
         let may = |factor: &ProblemFactor| match self {
             Self::All => true,
@@ -30,7 +32,7 @@ impl Candidates {
                 let places =
                     factor.variables.iter().map(place).map(|place| (place.column, place.index as u64));
                 let is_alone = || {
-                    let mut variables = factor.variables.to_vec();
+                    let mut variables = VariableIndices::from_slice(&factor.variables);
                     variables.sort_unstable();
                     connections.get(&variables).is_some_and(|factors| factors.len() == 1)
                 };
