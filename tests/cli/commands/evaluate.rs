@@ -58,7 +58,7 @@ fn boxes_that_do_not_meet_are_an_error() {
     );
     manifactor(&format!("evaluate --boxes {one} {other}"))
         .ended(2)
-        .complains("are time stamps and sides written alike?");
+        .complains("boxes match if their timestamps and their four sides are equal");
     manifactor(&format!("evaluate --boxes {one} {one} --delta 3")).ended(2).complains("cannot be used with");
 }
 
