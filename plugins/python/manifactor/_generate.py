@@ -11,7 +11,7 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
-from . import _native
+from . import _native, _reference
 
 KINDS = ("factor", "loss", "solver", "start")
 CLASSES = {"factor": "Factor", "loss": "Loss", "solver": "Solver", "start": "Start", "variable": "Variable"}
@@ -335,6 +335,8 @@ def modules() -> dict[str, str]:
 def main() -> None:
     for name, text in modules().items():
         (Path(__file__).parent / f"{name}.py").write_text(text, encoding="utf-8")
+    if _reference.PAGE.parent.is_dir():
+        _reference.PAGE.write_text(_reference.page(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from typing import Any
 
 import manifactor as mf
 import pytest
-from manifactor import _generate, _native
+from manifactor import _generate, _native, _reference
 
 ENTRIES: list[dict[str, Any]] = json.loads(_native.catalogue())
 CONSTRUCTED = [entry for entry in ENTRIES if entry["kind"] in ("factor", "loss", "solver", "start", "variable")]
@@ -20,6 +20,11 @@ CONSTRUCTED = [entry for entry in ENTRIES if entry["kind"] in ("factor", "loss",
 def test_what_is_generated_is_what_the_catalogue_says(name: str) -> None:
     written = (Path(_generate.__file__).parent / f"{name}.py").read_text(encoding="utf-8")
     assert written == _generate.modules()[name], "run python -m manifactor._generate"
+
+
+def test_the_reference_page_matches_the_package() -> None:
+    written = (Path(__file__).parents[3] / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    assert written == _reference.page(), "run python -m manifactor._generate"
 
 
 def constructor(entry: dict[str, Any]) -> Any:

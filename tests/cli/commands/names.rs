@@ -104,12 +104,13 @@ fn a_wrong_command_line_is_exit_code_2() {
 }
 
 #[test]
-fn the_config_reference_of_the_docs_is_that_of_what_is_linked() {
-    let written = std::fs::read_to_string(crate::root().join("docs/config.md")).unwrap();
-    let now = manifactor("list --markdown").ended(0).stdout;
-    let first = now.lines().zip(written.lines()).find(|(now, written)| now != written);
-    assert!(
-        now == written,
-        "docs/config.md is stale, first at {first:?}: manifactor list --markdown > docs/config.md"
-    );
+fn the_generated_pages_of_the_docs_are_up_to_date() {
+    for (page, command) in
+        [("docs/config.md", "list --markdown"), ("docs/reference/command-line.md", "man --markdown")]
+    {
+        let written = std::fs::read_to_string(crate::root().join(page)).unwrap();
+        let now = manifactor(command).ended(0).stdout;
+        let first = now.lines().zip(written.lines()).find(|(now, written)| now != written);
+        assert!(now == written, "{page} is stale, first at {first:?}: manifactor {command} > {page}");
+    }
 }
