@@ -58,7 +58,7 @@ pub struct UpdateReport {
 
 /// A factor that is rejected as an outlier.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Rejection {
+pub struct RejectedFactor {
     /// The factor.
     pub factor: FactorId,
     /// The update that rejected it. The first update is 1.
