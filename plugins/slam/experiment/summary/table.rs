@@ -78,7 +78,7 @@ impl TrialOutcome {
     }
 
     /// Returns one measure; `None` if it is unknown.
-    pub fn measure_by_name(&self, name: &str) -> Option<f64> {
+    pub(crate) fn measure_by_name(&self, name: &str) -> Option<f64> {
         match self {
             Self::Solved { measures, .. } => measures.get(name).copied(),
             Self::Failed { .. } => None,
