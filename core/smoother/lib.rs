@@ -32,7 +32,7 @@ mod smoother;
 
 pub use error::{ChangeError, UpdateError};
 pub use factor_id::FactorId;
-pub use report::{Rejection, SharedList, UpdateReport};
+pub use report::{FactorRejection, SharedList, UpdateReport};
 pub use saved::{LoadError, SaveError};
 pub use settings::{NotOneSpan, Outliers, SmootherSettings, Span, Window};
 pub use smoother::{Finished, Smoother, SmootherCovarianceError};

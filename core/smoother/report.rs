@@ -56,9 +56,9 @@ pub struct UpdateReport {
     pub inactive: usize,
 }
 
-/// A factor that is rejected as an outlier.
+/// The rejection of a factor as an outlier.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Rejection {
+pub struct FactorRejection {
     /// The factor.
     pub factor: FactorId,
     /// The update that rejected it. The first update is 1.

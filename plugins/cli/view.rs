@@ -95,7 +95,7 @@ impl View {
         seconds: f64,
     ) {
         let is_due = server::watchers(&self.map) > 0 && Instant::now() >= self.due.get();
-        self.change(|map| map.frame(report, observation, mapper, seconds));
+        self.change(|map| map.add_frame(report, observation, mapper, seconds));
         if is_due {
             let began = Instant::now();
             self.refresh(mapper);
@@ -110,12 +110,12 @@ impl View {
 
     /// Shows the map estimated from all frames.
     pub(crate) fn show_estimate(&self, estimate: &Estimate) {
-        self.change(|map| map.settle(estimate));
+        self.change(|map| map.show_estimate(estimate));
     }
 
     /// Sends the outcome to the browsers, and waits for them for a limited time.
     pub(crate) fn end(self, words: &str) {
-        self.change(|map| map.enter(Phase::Ended(words.to_owned()), None));
+        self.change(|map| map.set_phase(Phase::Ended(words.to_owned()), None));
         drop(self.map);
         // a panic of the server has already printed its message
         let _ = self.server.join();
@@ -129,7 +129,7 @@ impl Observer for SolveDisplay<'_> {
     fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()> {
         if let Some(view) = self.0 {
             let phase = Phase::Solving { iteration: record.iteration };
-            view.change(|map| map.enter(phase, Some(record.cost)));
+            view.change(|map| map.set_phase(phase, Some(record.cost)));
         }
         ControlFlow::Continue(())
     }

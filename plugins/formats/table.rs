@@ -5,14 +5,14 @@ pub use parquet::to_parquet;
 
 /// A table, column by column.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Table {
+pub struct DataTable {
     /// Names and cells; all columns have equal length.
-    pub columns: Vec<(String, Column)>,
+    pub columns: Vec<(String, DataColumn)>,
 }
 
 /// The cells of a column.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Column {
+pub enum DataColumn {
     /// Text cells.
     Text(Vec<String>),
     /// Numeric cells; `None` for a missing number.
@@ -38,7 +38,7 @@ pub enum TableError {
     Writer(String),
 }
 
-impl Column {
+impl DataColumn {
     /// Returns the number of cells.
     pub fn len(&self) -> usize {
         match self {
@@ -61,7 +61,7 @@ impl Column {
     }
 }
 
-impl Table {
+impl DataTable {
     /// Returns the number of rows.
     ///
     /// # Errors
@@ -104,10 +104,12 @@ fn no_formula(text: &str) -> String {
 }
 
 #[cfg(test)]
-pub(crate) fn sample() -> Table {
+pub(crate) fn sample() -> DataTable {
     let text = ["plain", "with, comma", "with \"quotes\""].map(str::to_owned).to_vec();
     let numbers = vec![Some(0.1 + 0.2), None, Some(-1e-300)];
-    Table { columns: vec![("name".into(), Column::Text(text)), ("x".into(), Column::Number(numbers))] }
+    DataTable {
+        columns: vec![("name".into(), DataColumn::Text(text)), ("x".into(), DataColumn::Number(numbers))],
+    }
 }
 
 #[cfg(test)]
@@ -119,7 +121,7 @@ mod tests {
         let text = sample().to_csv().unwrap();
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let rows: Vec<(String, Option<f64>)> = reader.deserialize().map(Result::unwrap).collect();
-        let Column::Number(numbers) = &sample().columns[1].1 else {
+        let DataColumn::Number(numbers) = &sample().columns[1].1 else {
             panic!("the second column is of numbers")
         };
         assert_eq!(rows.iter().map(|row| row.1).collect::<Vec<_>>(), *numbers);
@@ -129,8 +131,8 @@ mod tests {
     #[test]
     fn texts_are_no_formulas() {
         let texts = ["=1+1", "+cmd", "-2+3", "@sum", "\t=1", "-0.5", "+1e3", "a=b", ""].map(str::to_owned);
-        let columns = vec![("=x".to_owned(), Column::Text(texts.into()))];
-        let text = Table { columns }.to_csv().unwrap();
+        let columns = vec![("=x".to_owned(), DataColumn::Text(texts.into()))];
+        let text = DataTable { columns }.to_csv().unwrap();
         let rows: Vec<String> = csv::ReaderBuilder::new()
             .has_headers(false)
             .from_reader(text.as_bytes())
@@ -144,7 +146,7 @@ mod tests {
     #[test]
     fn ragged_columns_are_refused() {
         let mut table = sample();
-        table.columns[1].1 = Column::Number(vec![]);
+        table.columns[1].1 = DataColumn::Number(vec![]);
         assert!(matches!(table.to_csv(), Err(TableError::Ragged { expected: 3, found: 0, .. })));
         assert!(matches!(to_parquet(&table), Err(TableError::Ragged { .. })));
     }

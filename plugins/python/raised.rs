@@ -19,7 +19,7 @@ pub(crate) fn raise() -> PyResult<()> {
 }
 
 /// Stores an exception until the solve has ended; only the first one is kept.
-pub(crate) fn keep(error: PyErr) {
+pub(crate) fn store_exception(error: PyErr) {
     if let Ok(mut raised) = RAISED.lock() {
         raised.get_or_insert(error);
     }

@@ -193,9 +193,9 @@ impl Sweep {
     }
 
     /// Saves a finished trial, given as its line of the journal.
-    fn keep(&mut self, line: &str) -> PyResult<()> {
-        let record =
-            serde_json::from_str(line).map_err(|error| errors::argument("Sweep.keep", "line", error))?;
+    fn save_trial(&mut self, line: &str) -> PyResult<()> {
+        let record = serde_json::from_str(line)
+            .map_err(|error| errors::argument("Sweep.save_trial", "line", error))?;
         self.journal.as_mut().map_or(Ok(()), |journal| journal.append(record).map_err(errors::failure))
     }
 

@@ -23,7 +23,7 @@ pub(crate) fn text(name: &'static str, text: impl Into<String>) -> Case {
 pub(crate) fn account(file: &str, command: &str, cases: Vec<Case>) -> String {
     let mut account = String::new();
     for (name, bytes) in cases {
-        keep(name, file, &bytes);
+        save_case(name, file, &bytes);
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join(file), &bytes).unwrap();
         let _ = write!(account, "## {name}\n{}\n{}\n", shown(&bytes), ended(folder.path(), command, file));
@@ -32,7 +32,7 @@ pub(crate) fn account(file: &str, command: &str, cases: Vec<Case>) -> String {
 }
 
 /// Writes a case into the folder `MANIFACTOR_KEEP`, if it is set, for tests of other programs.
-fn keep(name: &str, file: &str, bytes: &[u8]) {
+fn save_case(name: &str, file: &str, bytes: &[u8]) {
     let Some(folder) = std::env::var_os("MANIFACTOR_KEEP") else { return };
     let extension = Path::new(file).extension().unwrap().to_str().unwrap();
     let name = format!("{}.{extension}", name.replace(' ', "_"));

@@ -19,7 +19,7 @@ use super::changes::{Change, Touched};
 use super::undetermined::Moves;
 use super::update::Undo;
 use crate::factor_id::FactorId;
-use crate::report::{Rejection, UpdateReport};
+use crate::report::{FactorRejection, UpdateReport};
 use fit::Fit;
 use manifactor_graph::{FactorEntry, Key, Resolved};
 use manifactor_solve::odometry::{best_fit, by_variables, is_sequential};
@@ -31,11 +31,11 @@ const MAX_REJECTIONS: usize = 4;
 impl Smoother {
     /// Returns the factors that are rejected as outliers, in the order of their ids; see
     /// [`Outliers`](crate::Outliers).
-    pub fn rejections(&mut self) -> Vec<Rejection> {
+    pub fn rejections(&mut self) -> Vec<FactorRejection> {
         let rejected: Vec<u32> = self.model.rejected().iter().copied().collect();
         let one = |f: u32| {
             let cost = self.fit().square(f).map(|square| 0.5 * square);
-            Some(Rejection { factor: FactorId(f), since: self.candidates.get(f)?.since, cost })
+            Some(FactorRejection { factor: FactorId(f), since: self.candidates.get(f)?.since, cost })
         };
         rejected.into_iter().filter_map(one).collect()
     }

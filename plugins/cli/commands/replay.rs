@@ -12,7 +12,7 @@ use clap::Args;
 use manifactor::formats::replay::{GraphReplay as Steps, Latencies, ReplayStep};
 use manifactor::graph::{Graph, Key};
 use manifactor::slam::output::OutputFolder;
-use manifactor::smoother::{Finished, Rejection, Smoother, Span, UpdateReport};
+use manifactor::smoother::{FactorRejection, Finished, Smoother, Span, UpdateReport};
 use manifactor::solve::{AllObservers, Interrupt, Silent};
 use manifactor::viz::latencies;
 use serde_json::json;
@@ -228,7 +228,7 @@ impl Replay {
         }
         if !rejections.is_empty() {
             text += &format!("{} rejected as outliers: ", count(rejections.len(), "factor"));
-            let name = |r: &Rejection| {
+            let name = |r: &FactorRejection| {
                 let entry = session.entry(r.factor)?;
                 let keys: Vec<&str> = entry.keys.iter().map(Key::as_str).collect();
                 Some(format!("{} (update {})", keys.join("-"), r.since))

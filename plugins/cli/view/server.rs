@@ -242,9 +242,9 @@ mod tests {
         };
         assert_eq!(state().unwrap()["phase"], "waiting");
         assert_eq!(watchers(&feed), 1);
-        change(&feed, |map| map.enter(Phase::Solving { iteration: 2 }, Some(0.5)));
+        change(&feed, |map| map.set_phase(Phase::Solving { iteration: 2 }, Some(0.5)));
         assert_eq!(state().unwrap()["words"], "iteration 2");
-        change(&feed, |map| map.enter(Phase::Ended("done".to_owned()), None));
+        change(&feed, |map| map.set_phase(Phase::Ended("done".to_owned()), None));
         drop(feed);
         // the server ends even if no browser reads
         server.join().unwrap();

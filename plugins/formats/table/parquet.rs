@@ -1,5 +1,5 @@
 //! Apache Parquet, uncompressed, in one row group: texts are required UTF-8, numbers optional doubles.
-use super::{Column, Table, TableError};
+use super::{DataColumn, DataTable, TableError};
 use ::parquet::basic::{LogicalType, Repetition, Type as Physical};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
 use ::parquet::errors::ParquetError;
@@ -12,12 +12,12 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// If columns differ in length or share a name.
-pub fn to_parquet(table: &Table) -> Result<Vec<u8>, TableError> {
+pub fn to_parquet(table: &DataTable) -> Result<Vec<u8>, TableError> {
     table.rows()?;
     write(table).map_err(|error| TableError::Writer(error.to_string()))
 }
 
-fn write(table: &Table) -> Result<Vec<u8>, ParquetError> {
+fn write(table: &DataTable) -> Result<Vec<u8>, ParquetError> {
     let fields = table.columns.iter().map(|(name, column)| field(name, column));
     let schema = Type::group_type_builder("table").with_fields(fields.collect::<Result<_, _>>()?).build()?;
     // The version of the library is not part of the data.
@@ -28,12 +28,12 @@ fn write(table: &Table) -> Result<Vec<u8>, ParquetError> {
     for (_, column) in &table.columns {
         let Some(mut writer) = group.next_column()? else { break };
         match column {
-            Column::Text(cells) => {
+            DataColumn::Text(cells) => {
                 let cells: Vec<ByteArray> =
                     cells.iter().map(|cell| cell.as_bytes().to_vec().into()).collect();
                 writer.typed::<ByteArrayType>().write_batch(&cells, None, None)?;
             }
-            Column::Number(cells) => {
+            DataColumn::Number(cells) => {
                 let levels: Vec<i16> = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
                 let present: Vec<f64> = cells.iter().copied().flatten().collect();
                 writer.typed::<DoubleType>().write_batch(&present, Some(&levels), None)?;
@@ -46,12 +46,12 @@ fn write(table: &Table) -> Result<Vec<u8>, ParquetError> {
     Ok(bytes)
 }
 
-fn field(name: &str, column: &Column) -> Result<TypePtr, ParquetError> {
+fn field(name: &str, column: &DataColumn) -> Result<TypePtr, ParquetError> {
     let builder = match column {
-        Column::Text(_) => Type::primitive_type_builder(name, Physical::BYTE_ARRAY)
+        DataColumn::Text(_) => Type::primitive_type_builder(name, Physical::BYTE_ARRAY)
             .with_logical_type(Some(LogicalType::String))
             .with_repetition(Repetition::REQUIRED),
-        Column::Number(_) => {
+        DataColumn::Number(_) => {
             Type::primitive_type_builder(name, Physical::DOUBLE).with_repetition(Repetition::OPTIONAL)
         }
     };

@@ -1,7 +1,7 @@
 //! Calls of a Python function, for many points at once.
 use crate::errors;
 use crate::input::{numbers_or_nan, to_array};
-use crate::raised::keep;
+use crate::raised::store_exception;
 use manifactor::graph::Variable;
 use manifactor::graph::quantity::VariableQuantity;
 use pyo3::prelude::*;
@@ -64,7 +64,7 @@ impl Function {
             match self.call(Inputs::new(self, points), false) {
                 Ok((residuals, _)) => all.extend(residuals),
                 Err(error) => {
-                    keep(error);
+                    store_exception(error);
                     all.resize(all.len() + points.len() * self.rows, f64::NAN);
                 }
             }
@@ -81,7 +81,7 @@ impl Function {
         for points in points.chunks((MOST / each).max(1)) {
             let done = if self.has_jacobian { self.by_python(points) } else { self.by_differences(points) };
             let (residuals, blocks) = done.unwrap_or_else(|error| {
-                keep(error);
+                store_exception(error);
                 let nothing = |size: usize| vec![f64::NAN; size * points.len()];
                 (nothing(self.rows), sizes.clone().map(nothing).collect())
             });

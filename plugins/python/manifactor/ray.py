@@ -86,7 +86,7 @@ def experiment(
         while running:
             (done, *_), _ = ray.wait(list(running))
             del running[done]
-            sweep.keep(ray.get(done))
+            sweep.save_trial(ray.get(done))
             if progress is not None:
                 progress(total - len(running), total)
         summary, folder = sweep.write()

@@ -1,10 +1,10 @@
 //! Data association by the joint likelihood of box and class.
 mod fit;
-mod second_look;
-mod sightings;
+mod merge;
+mod posed_detections;
+mod reassociation;
 mod track;
 mod tracker;
-mod union;
 
 use super::{Association, Associator};
 use fit::BoxNoise;

@@ -3,7 +3,7 @@ use crate::document::{Experiment, ExperimentSources};
 use crate::journal::TrialLog;
 use crate::summary::{Comparison, ExperimentSummary, times_table, trials_table};
 use manifactor_config::to_toml;
-use manifactor_formats::table::{Column, Table, TableError, to_parquet};
+use manifactor_formats::table::{DataColumn, DataTable, TableError, to_parquet};
 use manifactor_metrics::Interval;
 use manifactor_run::output::{OutputError, format_results, write_document, write_whole};
 use std::fmt;
@@ -22,7 +22,7 @@ pub fn write(experiment: &Experiment, journal: &TrialLog) -> Result<ExperimentSu
     // in a separate folder, because the results may already be beside files with these names
     write_document(&file("repeat/experiment.toml"), to_toml(own))?;
     write_document(&file("repeat/base.toml"), to_toml(base))?;
-    let csv = |table: &Table| table.to_csv().map(String::into_bytes);
+    let csv = |table: &DataTable| table.to_csv().map(String::into_bytes);
     let trials = trials_table(experiment, journal);
     write("trials.csv", csv(&trials))?;
     write("trials.parquet", to_parquet(&trials))?;
@@ -36,8 +36,8 @@ pub fn write(experiment: &Experiment, journal: &TrialLog) -> Result<ExperimentSu
 
 impl ExperimentSummary {
     /// Returns a row for each group and metric.
-    pub fn table(&self) -> Table {
-        let mut table = Table::default();
+    pub fn table(&self) -> DataTable {
+        let mut table = DataTable::default();
         let mut rows = vec![];
         for group in &self.groups {
             for metric in &self.metrics {
@@ -46,12 +46,12 @@ impl ExperimentSummary {
         }
         for (i, column) in self.columns.iter().enumerate() {
             let labels = rows.iter().map(|row| row.0.labels.get(i).cloned().unwrap_or_default()).collect();
-            table.columns.push((column.clone(), Column::Text(labels)));
+            table.columns.push((column.clone(), DataColumn::Text(labels)));
         }
         let names = rows.iter().map(|row| row.1.clone()).collect();
-        table.columns.push(("metric".into(), Column::Text(names)));
+        table.columns.push(("metric".into(), DataColumn::Text(names)));
         let mut number = |name: &str, cells: Vec<Option<f64>>| {
-            table.columns.push((name.to_owned(), Column::Number(cells)));
+            table.columns.push((name.to_owned(), DataColumn::Number(cells)));
         };
         number("trials", rows.iter().map(|row| Some(row.0.trials as f64)).collect());
         number("failed", rows.iter().map(|row| Some(row.0.failed as f64)).collect());

@@ -1,7 +1,7 @@
 //! Batch estimation: map and trajectory of a whole sequence.
-pub mod looks;
 pub mod refine;
 pub mod variance;
+pub mod visibility;
 
 use crate::estimate::refine::Refiner;
 use crate::estimate::variance::{VarianceComponents, VarianceError, VarianceSettings};

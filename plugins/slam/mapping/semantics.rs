@@ -153,7 +153,7 @@ impl SemanticRule {
 }
 
 /// Returns the text of a shipped file of rules.
-pub fn shipped_text(name: &str) -> Option<&'static str> {
+fn shipped_text(name: &str) -> Option<&'static str> {
     (name == "table_one").then_some(TABLE_ONE)
 }
 

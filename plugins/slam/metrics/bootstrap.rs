@@ -19,13 +19,6 @@ pub struct Interval {
     pub high: Option<f64>,
 }
 
-impl Interval {
-    /// Returns whether zero lies outside of the interval; false without an interval.
-    pub fn excludes_zero(&self) -> bool {
-        self.low.is_some_and(|low| low > 0.0) || self.high.is_some_and(|high| high < 0.0)
-    }
-}
-
 /// Returns the mean of all values and its percentile interval. Resamples whole clusters with replacement, as
 /// many as there are. `None` without values. The result depends only on the values, the number of resamples
 /// and the seed.
@@ -119,9 +112,14 @@ mod tests {
         {
             let interval = bootstrap(&clusters, resamples, 1).unwrap();
             assert_eq!(interval, Interval { mean: 2.0, low: None, high: None });
-            assert!(!interval.excludes_zero());
+            assert!(!excludes_zero(&interval));
             assert_eq!(serde_json::to_string(&interval).unwrap(), r#"{"mean":2.0}"#);
         }
+    }
+
+    /// Returns whether zero lies outside of the interval; false without an interval.
+    fn excludes_zero(interval: &Interval) -> bool {
+        interval.low.is_some_and(|low| low > 0.0) || interval.high.is_some_and(|high| high < 0.0)
     }
 
     /// Poses at intervals of one second, with the given position errors.
@@ -138,10 +136,10 @@ mod tests {
     fn a_change_that_is_everywhere_is_certain_and_one_in_a_single_block_is_not() {
         let before = poses_with_errors(|_| 0.1);
         let certain = change_of_error(&before, &poses_with_errors(|_| 0.08)).unwrap();
-        assert!((certain.mean + 0.2).abs() < 1e-12 && certain.excludes_zero(), "{certain:?}");
+        assert!((certain.mean + 0.2).abs() < 1e-12 && excludes_zero(&certain), "{certain:?}");
         let uncertain =
             change_of_error(&before, &poses_with_errors(|i| if i < 10 { 0.0 } else { 0.1 })).unwrap();
-        assert!(uncertain.mean < 0.0 && !uncertain.excludes_zero(), "{uncertain:?}");
+        assert!(uncertain.mean < 0.0 && !excludes_zero(&uncertain), "{uncertain:?}");
         assert_eq!(change_of_error(&poses_with_errors(|_| 0.0), &before), None);
         assert_eq!(change_of_error(&[], &[]), None);
     }

@@ -32,12 +32,12 @@ pub struct IdentityScores {
     pub switches: usize,
     /// Number of true objects.
     pub true_objects: usize,
-    /// Number of objects with at least [`MIN_OBJECT_BOXES`] boxes.
+    /// Number of objects with at least three boxes.
     pub objects: usize,
 }
 
 /// Smallest number of boxes of an object that counts.
-pub const MIN_OBJECT_BOXES: usize = 3;
+const MIN_OBJECT_BOXES: usize = 3;
 
 /// Scores boxes in the order of time. Each has its true object and its assigned object; a box without an
 /// assigned object is alone.

@@ -43,23 +43,24 @@ pub struct PriorObject {
     /// Covariance of the estimate in tangent order: rotation in rad and centre in m, both in the object's
     /// frame, then the logarithms of the semi-axes.
     pub covariance: [[f64; 9]; 9],
-    /// Number of looks at the object, with and without a detection.
-    pub looks: LookCounts,
+    /// Number of opportunities to detect the object, with and without a detection.
+    #[serde(rename = "looks")]
+    pub detection_counts: DetectionCounts,
     /// Smallest detected size in pixels: the square root of the box area. Default: unknown, as in maps of
     /// earlier programs.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "least_px")]
     pub least_px: Option<f64>,
 }
 
-/// Number of looks at an object, and number of looks with a detection. A look groups frames from nearby times
-/// and directions, because a detector that misses an object in one frame usually misses it in the next as
-/// well.
+/// Number of opportunities to detect an object, and number of those with a detection. An opportunity groups
+/// frames from nearby times and directions, because a detector that misses an object in one frame usually
+/// misses it in the next as well.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LookCounts {
-    /// Number of looks.
+pub struct DetectionCounts {
+    /// Number of opportunities.
     pub expected: usize,
-    /// Number of looks with at least one box.
+    /// Number of opportunities with at least one box.
     pub seen: usize,
 }
 
@@ -164,8 +165,8 @@ impl PriorObject {
     }
 }
 
-impl LookCounts {
-    /// Returns the probability of a detection in one look.
+impl DetectionCounts {
+    /// Returns the probability of a detection at one opportunity.
     pub fn detection_rate(&self) -> f64 {
         (self.seen + 1) as f64 / (self.expected + 2) as f64
     }
@@ -223,10 +224,10 @@ mod tests {
     }
 
     #[test]
-    fn looks_say_how_likely_an_object_is_seen() {
-        let looks = LookCounts { expected: 8, seen: 8 }.plus(LookCounts { expected: 10, seen: 0 });
-        assert_eq!(looks, LookCounts { expected: 18, seen: 8 });
-        assert!((looks.detection_rate() - 0.45).abs() < 1e-12);
-        assert!((LookCounts::default().detection_rate() - 0.5).abs() < 1e-12);
+    fn counts_give_the_detection_rate_of_an_object() {
+        let counts = DetectionCounts { expected: 8, seen: 8 }.plus(DetectionCounts { expected: 10, seen: 0 });
+        assert_eq!(counts, DetectionCounts { expected: 18, seen: 8 });
+        assert!((counts.detection_rate() - 0.45).abs() < 1e-12);
+        assert!((DetectionCounts::default().detection_rate() - 0.5).abs() < 1e-12);
     }
 }

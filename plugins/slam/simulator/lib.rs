@@ -24,8 +24,7 @@ mod solid;
 mod trajectory;
 
 pub use noise::{AccelerometerNoise, DetectorSettings, MotionNoise, NoiseSpread};
-pub use scene::{SceneObject, SceneSettings};
-pub use solid::{ImageBoxes, Solid};
+pub use scene::SceneSettings;
 pub use trajectory::TrajectorySettings;
 
 use detection::DetectorErrors;

@@ -72,13 +72,11 @@ impl Default for SceneSettings {
 
 /// An object of a scene.
 #[derive(Debug, Clone)]
-pub struct SceneObject {
+pub(crate) struct SceneObject {
     /// Ground truth of the object.
     pub truth: TrueObject,
     /// Shape, in the frame of the truth's `world_from_object`.
     pub solid: Solid,
-    /// True if the object does not stand or lie as usual for its class.
-    pub tilted: bool,
 }
 
 impl SceneSettings {
@@ -86,7 +84,7 @@ impl SceneSettings {
     ///
     /// # Errors
     /// An unknown class, or a rectangle that is too small.
-    pub fn objects(&self, rng: &mut Pcg64) -> Result<Vec<SceneObject>, SimulationError> {
+    pub(crate) fn objects(&self, rng: &mut Pcg64) -> Result<Vec<SceneObject>, SimulationError> {
         let classes: Vec<&str> = match self.classes.is_empty() {
             true => KINDS.iter().map(|kind| kind.class).collect(),
             false => self.classes.iter().map(String::as_str).collect(),
@@ -141,7 +139,7 @@ impl SceneSettings {
             half_extents: solid.half_extents(),
             bounding_box: around.ok_or(SimulationError::NoRoom { object: id })?,
         };
-        Ok(SceneObject { truth, solid, tilted })
+        Ok(SceneObject { truth, solid })
     }
 
     /// Returns a free place for an object of this radius, apart from the placed objects.

@@ -9,13 +9,13 @@ const NEAR_PLANE_M: f64 = 0.05;
 
 /// Convex faces in space, each a list of corners. The frame's origin is the centre of the enclosing box.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Solid {
+pub(crate) struct Solid {
     faces: Vec<Vec<Vector3<f64>>>,
 }
 
 impl Solid {
     /// Returns a box of these extents in metres.
-    pub fn cuboid(extents: [f64; 3]) -> Self {
+    pub(crate) fn cuboid(extents: [f64; 3]) -> Self {
         let [x, y, z] = extents.map(|e| e / 2.0);
         let rectangle = |a: Vector3<f64>, u: Vector3<f64>, v: Vector3<f64>| {
             [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(|(s, t)| a + u * s + v * t).to_vec()
@@ -28,12 +28,12 @@ impl Solid {
     }
 
     /// Returns a round body along z: radii at the bottom and the top, and the height, in metres.
-    pub fn frustum(bottom: f64, top: f64, height: f64) -> Self {
+    pub(crate) fn frustum(bottom: f64, top: f64, height: f64) -> Self {
         Self::turned(&[(bottom, -height / 2.0), (top, height / 2.0)])
     }
 
     /// Returns a ball with this radius in metres.
-    pub fn ball(radius: f64) -> Self {
+    pub(crate) fn ball(radius: f64) -> Self {
         const RINGS: usize = 8;
         let ring = |i: usize| {
             let latitude = (i as f64 / RINGS as f64 - 0.5) * TAU / 2.0;
@@ -59,7 +59,7 @@ impl Solid {
 
     /// Returns a flat part with an upright part along its far edge, like a chair or an open laptop: width,
     /// depth, height and the thickness of both parts, in metres.
-    pub fn folded([width, depth, height]: [f64; 3], thickness: f64) -> Self {
+    pub(crate) fn folded([width, depth, height]: [f64; 3], thickness: f64) -> Self {
         let flat = Self::cuboid([width, depth, thickness]).moved(Vector3::z() * (thickness - height) / 2.0);
         let back = Self::cuboid([width, thickness, height]).moved(Vector3::y() * (depth - thickness) / 2.0);
         Self { faces: flat.faces.into_iter().chain(back.faces).collect() }
@@ -72,24 +72,24 @@ impl Solid {
 
     /// Returns the shape scaled by a factor.
     #[must_use]
-    pub fn scaled(mut self, factor: f64) -> Self {
+    pub(crate) fn scaled(mut self, factor: f64) -> Self {
         self.faces.iter_mut().flatten().for_each(|corner| *corner *= factor);
         self
     }
 
     /// Returns the corners of all faces; shared corners are repeated.
-    pub fn corners(&self) -> impl Iterator<Item = &Vector3<f64>> {
+    pub(crate) fn corners(&self) -> impl Iterator<Item = &Vector3<f64>> {
         self.faces.iter().flatten()
     }
 
     /// Returns half the extents along the axes of the solid.
-    pub fn half_extents(&self) -> Vector3<f64> {
+    pub(crate) fn half_extents(&self) -> Vector3<f64> {
         self.corners().fold(Vector3::zeros(), |most, corner| most.sup(&corner.abs()))
     }
 
     /// Returns the boxes around the solid in an image, without and with the image border. `None` if no part
     /// is in front of the camera or inside the image.
-    pub fn boxes(
+    pub(crate) fn boxes(
         &self,
         world_from_object: &Se3,
         camera: &Camera,
@@ -121,7 +121,7 @@ impl Solid {
 
 /// Boxes around an object in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ImageBoxes {
+pub(crate) struct ImageBoxes {
     /// Box around the whole object, as if the image had no border.
     pub whole: BoundingBox,
     /// Box around the part inside the image.

@@ -48,7 +48,7 @@ impl Default for TrajectorySettings {
 
 impl TrajectorySettings {
     /// Returns `world_from_camera` for each image, for objects that rest at the height `ground`.
-    pub fn poses(&self, ground: f64, rng: &mut Pcg64) -> Vec<Se3> {
+    pub(crate) fn poses(&self, ground: f64, rng: &mut Pcg64) -> Vec<Se3> {
         let start = rng.random::<f64>() * TAU;
         let mut wave = |size: f64| {
             let (turns, phase) = (rng.random_range(1.0..3.0), rng.random::<f64>() * TAU);

@@ -118,8 +118,8 @@ fn a_map_is_read_as_it_was_written() {
     let map = mapped(folder.path(), |_| {});
     assert!(map.objects.len() >= 11, "{}", map.objects.len());
     assert_eq!(PriorMap::read(&folder.path().join("map.json")).unwrap(), map);
-    let seen = map.objects.iter().filter(|object| object.looks.detection_rate() > 0.5).count();
-    assert!(seen >= 10, "{:?}", map.objects.iter().map(|object| object.looks).collect::<Vec<_>>());
+    let seen = map.objects.iter().filter(|object| object.detection_counts.detection_rate() > 0.5).count();
+    assert!(seen >= 10, "{:?}", map.objects.iter().map(|object| object.detection_counts).collect::<Vec<_>>());
 }
 
 #[test]
@@ -256,10 +256,10 @@ fn removed_objects_are_reported_and_new_ones_are_added() {
     let after = map_of(&estimate, &settings).unwrap();
     assert!(after.object(prior.gone[0]).is_none());
     assert!(prior.added.iter().any(|id| near(id, &after, place(2))), "{prior:?}");
-    // an extended map has smaller covariances, and the looks and classes of both walks
+    // an extended map has smaller covariances, and the opportunities and classes of both walks
     let id = prior.seen[0];
-    let looks = |map: &PriorMap| map.object(id).unwrap().looks.expected;
-    assert!(looks(&after) > looks(&map));
+    let opportunities = |map: &PriorMap| map.object(id).unwrap().detection_counts.expected;
+    assert!(opportunities(&after) > opportunities(&map));
     let spread = |map: &PriorMap, id: &ObjectId| map.object(*id).unwrap().covariance().determinant().ln();
     let better = prior.seen.iter().filter(|id| spread(&after, id) < spread(&map, id)).count();
     assert!(better + 1 >= prior.seen.len(), "{better} of {}", prior.seen.len());

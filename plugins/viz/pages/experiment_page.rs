@@ -3,7 +3,7 @@ use crate::canvas::Ink;
 use crate::drawing::{Chart, Curve, Distribution, Intervals, Mean, Picture, figure};
 use crate::pages::page::Page;
 use crate::pages::run_page::{WIDTH, version};
-use manifactor_formats::table::{Column, Table};
+use manifactor_formats::table::{DataColumn, DataTable};
 use manifactor_slam::experiment::{Experiment, ExperimentSummary};
 
 /// Draws the pictures of an experiment. Each metric has a picture of its differences from the baseline, if
@@ -12,7 +12,7 @@ use manifactor_slam::experiment::{Experiment, ExperimentSummary};
 pub fn experiment_pictures(
     experiment: &Experiment,
     summary: &ExperimentSummary,
-    trials: &Table,
+    trials: &DataTable,
     width: f64,
 ) -> Vec<Picture> {
     let picture = |metric: &String| match &experiment.summary.curve {
@@ -63,7 +63,7 @@ const TRIALS: usize = 1000;
 pub fn experiment_page(
     experiment: &Experiment,
     summary: &ExperimentSummary,
-    trials: &Table,
+    trials: &DataTable,
     config: &str,
 ) -> String {
     let mut page = Page::new(&experiment.title);
@@ -102,9 +102,9 @@ pub fn experiment_page(
         page.paragraph(&format!("The first {TRIALS} of {rows}; trials.csv has all."));
     }
     let header: Vec<String> = trials.columns.iter().map(|(name, _)| name.clone()).collect();
-    let cell = |column: &Column, row| match column {
-        Column::Text(cells) => cells.get(row).cloned().unwrap_or_default(),
-        Column::Number(cells) => cells.get(row).copied().flatten().map_or(String::new(), short),
+    let cell = |column: &DataColumn, row| match column {
+        DataColumn::Text(cells) => cells.get(row).cloned().unwrap_or_default(),
+        DataColumn::Number(cells) => cells.get(row).copied().flatten().map_or(String::new(), short),
     };
     let row = |row| trials.columns.iter().map(|(_, column)| cell(column, row)).collect();
     page.table(&header, &(0..rows.min(TRIALS)).map(row).collect::<Vec<Vec<String>>>());
@@ -118,14 +118,14 @@ fn short(x: f64) -> String {
 }
 
 /// Returns the values of a metric by group of the summary.
-fn distribution(summary: &ExperimentSummary, trials: &Table, metric: &str) -> Distribution {
+fn distribution(summary: &ExperimentSummary, trials: &DataTable, metric: &str) -> Distribution {
     let column = |name: &str| trials.columns.iter().find(|(own, _)| own == name).map(|(_, column)| column);
     let texts = |name: &String| match column(name) {
-        Some(Column::Text(cells)) => cells.as_slice(),
+        Some(DataColumn::Text(cells)) => cells.as_slice(),
         _ => &[],
     };
     let values = match column(metric) {
-        Some(Column::Number(cells)) => cells.as_slice(),
+        Some(DataColumn::Number(cells)) => cells.as_slice(),
         _ => &[],
     };
     let labels: Vec<&[String]> = summary.columns.iter().map(texts).collect();

@@ -88,7 +88,7 @@ impl LiveMap {
 
     /// Adds the result of a frame. The time depends on the number of objects and boxes, but not on the
     /// length of the path.
-    pub fn frame(
+    pub fn add_frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
         observation: Option<&Observation>,
@@ -98,7 +98,7 @@ impl LiveMap {
         self.phase = Phase::Running;
         let report = match report {
             Ok(report) => report,
-            Err(error) => return self.notes.left_out(self.frames, &error.to_string()),
+            Err(error) => return self.notes.add_skipped_frame(self.frames, &error.to_string()),
         };
         if self.seconds.len() == LATENCIES {
             self.seconds.pop_front();
@@ -115,7 +115,7 @@ impl LiveMap {
             let measured = mapper.measurements().objects.iter().find(|object| object_key(object.id) == *key);
             measured.and_then(ObjectMeasurements::class_name)
         };
-        self.notes.take(report, |id| mapper.id_changes().current_id(id), class);
+        self.notes.add_events(report, |id| mapper.id_changes().current_id(id), class);
         let parked = report
             .updates
             .last()
@@ -126,7 +126,7 @@ impl LiveMap {
             let directions = undetermined.iter().map(|(key, direction)| format!("{key}: {direction}"));
             self.undetermined = parked.chain(directions).take(NAMED).collect();
         }
-        self.look(mapper);
+        self.update_objects(mapper);
         if let Some(observation) = observation {
             let odometry = mapper.odometry(observation).unwrap_or(report.pose);
             let tracked = |pose| PoseRecord { pose, error: None, relative: None };
@@ -137,7 +137,7 @@ impl LiveMap {
                 estimate: tracked(report.pose),
                 boxes: vec![],
             });
-            self.see(report, observation, mapper);
+            self.set_boxes(report, observation, mapper);
         }
     }
 
@@ -145,11 +145,11 @@ impl LiveMap {
     pub fn refresh(&mut self, mapper: &mut Mapper) {
         self.path.correct(|frame| mapper.pose_of(frame));
         self.cost = Some(mapper.smoother().cost());
-        self.look(mapper);
+        self.update_objects(mapper);
     }
 
     /// Shows the map estimated from all frames.
-    pub fn settle(&mut self, estimate: &Estimate) {
+    pub fn show_estimate(&mut self, estimate: &Estimate) {
         let poses = estimate.trajectory();
         self.path.correct(|frame| poses.get(frame).map(|stamped| stamped.pose));
         let landmarks = estimate.landmarks();
@@ -157,32 +157,33 @@ impl LiveMap {
             let class = mark.object.class.as_ref().map(|class| class.name.as_str());
             record(mark.object.id, class, mark.object.boxes, *mark.quadric)
         };
-        self.hold(landmarks.iter().map(record).collect());
+        self.set_objects(landmarks.iter().map(record).collect());
         // the predictions of the last image belong to the earlier estimate
         self.boxes.iter_mut().for_each(LiveBox::forget_estimate);
         self.cost = Some(estimate.solution.outcome.final_cost);
     }
 
     /// Sets the phase of the stream, and the cost if it is known.
-    pub fn enter(&mut self, phase: Phase, cost: Option<f64>) {
+    pub fn set_phase(&mut self, phase: Phase, cost: Option<f64>) {
         self.phase = phase;
         self.cost = cost.or(self.cost);
     }
 
     /// Updates the objects and the up direction.
-    fn look(&mut self, mapper: &Mapper) {
+    fn update_objects(&mut self, mapper: &Mapper) {
         self.camera = Some(*mapper.camera());
         let record = |(measured, quadric): (&ObjectMeasurements, DualQuadric)| {
             record(measured.id, measured.class_name(), measured.views.len(), quadric)
         };
-        self.hold(mapper.objects().map(record).collect());
+        self.set_objects(mapper.objects().map(record).collect());
         // if up is unknown, up in the first image is the best guess
         let image_up = || self.path.first().map(|first| first.rotation.act(&-Vector3::y()));
         let up = mapper.up().or_else(|| Direction::new(image_up()?).ok());
         self.up = up.unwrap_or(self.up);
     }
 
-    fn hold(&mut self, objects: Vec<ObjectRecord>) {
+    /// Replaces the objects, and adds their new classes to the legend.
+    fn set_objects(&mut self, objects: Vec<ObjectRecord>) {
         for object in &objects {
             if !self.classes.contains(&object.class) {
                 self.classes.push(object.class.clone());
@@ -192,7 +193,7 @@ impl LiveMap {
     }
 
     /// Stores the boxes of a frame, each with the prediction of the estimate.
-    fn see(&mut self, report: &FrameReport, observation: &Observation, mapper: &Mapper) {
+    fn set_boxes(&mut self, report: &FrameReport, observation: &Observation, mapper: &Mapper) {
         let known = |id: ObjectId| self.objects.iter().find(|object| object.id == id);
         let boxes = observation.detections.iter().zip(&report.box_objects).map(|(detection, name)| {
             let class = detection.scores.best().map_or("unknown", |(class, _)| class);

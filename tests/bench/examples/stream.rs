@@ -81,7 +81,7 @@ fn main() {
         let mut gaps = Gaps { every, frames: 0, solver, found: vec![], batches: vec![], longest: vec![] };
         let (_, report) = run.run_variant_online(variant, &mut gaps, &mut Silent).unwrap();
         let (_, batch) = run.run_variant(variant, &mut Silent).unwrap();
-        tell(&report, &batch);
+        print_report(&report, &batch);
         gaps.found.sort_by(f64::total_cmp);
         if let (Some(median), Some(most)) = (gaps.found.get(gaps.found.len() / 2), gaps.found.last()) {
             println!("  gap: median {median:.1e}, max {most:.1e}");
@@ -94,7 +94,8 @@ fn main() {
     }
 }
 
-fn tell(report: &VariantReport, batch: &VariantReport) {
+/// Prints the latencies of the stream, and its result next to that of the batch.
+fn print_report(report: &VariantReport, batch: &VariantReport) {
     let Some(online) = &report.online else { return };
     let Latencies { total, p50, p99, max } = online.latencies;
     let ms = 1e3;

@@ -165,7 +165,7 @@ impl Browser {
     }
 
     /// Saves a screenshot for people, if MANIFACTOR_SCREENSHOTS names a folder.
-    pub(crate) fn keep(&mut self, name: &str) {
+    pub(crate) fn save_screenshot(&mut self, name: &str) {
         let Ok(folder) = std::env::var("MANIFACTOR_SCREENSHOTS") else { return };
         let shot = self.call("Page.captureScreenshot", json!({ "format": "png" }));
         let bytes = decoded(shot["data"].as_str().unwrap());

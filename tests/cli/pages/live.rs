@@ -76,7 +76,7 @@ fn frames(desk: &str, renamed: &str) -> Vec<String> {
 }
 
 /// Reads until the server closes the connection. The server has already sent a state before this returns.
-fn look(url: &str) -> JoinHandle<()> {
+fn open_events(url: &str) -> JoinHandle<()> {
     let host = url.trim_start_matches("http://").trim_end_matches('/').to_owned();
     let mut stream = TcpStream::connect(&host).unwrap();
     write!(stream, "GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
@@ -144,7 +144,7 @@ fn a_page_shows_the_map_as_it_grows() {
         browser.until("canvas.dataset.frame === '59'");
         let wide = browser.value("document.documentElement.scrollWidth").as_f64().unwrap();
         assert!(wide <= f64::from(width), "{wide} of {width} pixels");
-        browser.keep(&format!("live_{width}_{scheme}"));
+        browser.save_screenshot(&format!("live_{width}_{scheme}"));
         browser.was_quiet();
     }
     stream.end();
@@ -164,24 +164,24 @@ fn a_page_shows_the_map_as_it_grows() {
     let x: f64 = last.lines().last().unwrap().split(' ').nth(1).unwrap().parse().unwrap();
     let shown = browser.value("mapView.variants[0].frames.at(-1)[4][0]").as_f64().unwrap();
     assert!((x - shown).abs() < 1e-4, "{x} m is shown as {shown} m");
-    browser.keep("live_ended");
+    browser.save_screenshot("live_ended");
     browser.was_quiet();
 }
 
 #[test]
-fn a_map_is_the_same_whoever_looks() {
+fn a_map_is_the_same_with_and_without_browsers() {
     let folder = folder(&[("desk.toml", DESK), ("live.toml", LIVE)]);
     let (live, out) = (path(&folder, "live.toml"), |name: &str| path(&folder, name));
     let frames = frames(&path(&folder, "desk.toml"), "laptop");
     fed(&format!("online {live} --out {}", out("unseen")), &frames.join("\n")).ended(0);
     let mut stream = Stream::begin(&format!("online {live} --out {} --view", out("seen")));
-    let looking = [look(&stream.url), look(&stream.url)];
+    let readers = [open_events(&stream.url), open_events(&stream.url)];
     for frame in &frames {
         stream.give(std::slice::from_ref(frame));
     }
     stream.end();
     assert_eq!(stream.ended().0, 0);
-    looking.into_iter().for_each(|looks| looks.join().unwrap());
+    readers.into_iter().for_each(|reader| reader.join().unwrap());
     let files = |name: &str| {
         let mut files = timeless(Path::new(&out(name)));
         files.retain(|name, _| !name.contains("latency."));
@@ -205,7 +205,7 @@ fn a_page_says_that_its_program_has_gone() {
     assert_eq!(browser.value("document.documentElement.dataset.map"), "static");
     assert_eq!(browser.value("document.querySelector('#images canvas').width > 200"), true);
     assert_eq!(browser.value("getComputedStyle(document.getElementById('view')).display"), "none");
-    browser.keep("live_static");
+    browser.save_screenshot("live_static");
     browser.was_quiet();
     stream.child.kill().unwrap();
     stream.child.wait().unwrap();

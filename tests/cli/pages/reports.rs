@@ -76,7 +76,7 @@ fn the_map_turns_zooms_and_tells_of_an_object() {
         let verdict = browser.value("document.querySelector('.verdict').textContent");
         assert!(verdict.as_str().unwrap().contains("ours beside QuadricSLAM"), "{verdict}");
         browser.value("document.getElementById('map').scrollIntoView()");
-        browser.keep(&format!("map_{width}_{scheme}"));
+        browser.save_screenshot(&format!("map_{width}_{scheme}"));
         // the text of a plot follows the page's theme
         let ink = browser.value("getComputedStyle(document.querySelector('svg text')).fill");
         assert_eq!(ink, if scheme == "dark" { "rgb(230, 233, 238)" } else { "rgb(29, 33, 41)" });
@@ -98,7 +98,7 @@ fn the_map_turns_zooms_and_tells_of_an_object() {
     for text in [class.as_str().unwrap(), "semi-axes (m)", "position error (m)", "residual"] {
         assert!(told.as_str().unwrap().contains(text), "{text}: {told}");
     }
-    browser.keep("picked");
+    browser.save_screenshot("picked");
     // the wheel zooms if the map has the focus, and scrolls the page otherwise
     let wheel = |browser: &mut Browser| {
         let event =
@@ -137,13 +137,13 @@ fn the_map_turns_zooms_and_tells_of_an_object() {
     browser.until(
         "mapView.parts().length === 1 && document.getElementById('key').textContent.includes('rings')",
     );
-    browser.keep("overlay");
+    browser.save_screenshot("overlay");
     browser.value(
         "document.querySelector('[data-show=overlay]').click(); document.getElementById('fit').click(); 0",
     );
     browser.value("document.querySelector('[data-show=error]').click(); 0");
     browser.until("document.getElementById('key').textContent.includes('error of the estimated path')");
-    browser.keep("errors");
+    browser.save_screenshot("errors");
     browser.was_quiet();
 }
 

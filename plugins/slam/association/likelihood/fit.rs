@@ -2,7 +2,7 @@
 //!
 //! One box determines an object except for its depth. A weak prior constrains the rest: the usual depth of
 //! the scene, axes of similar length, and a rotation close to that of the first camera.
-use super::sightings::Sighting;
+use super::posed_detections::PosedDetection;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Manifold, Residual};
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric, QuadricPrior};
@@ -91,7 +91,7 @@ impl BoxNoise {
 impl ObjectPrior {
     /// Returns the prior of an object seen once, at `depth` metres, with the standard deviation `spread` of
     /// its logarithm.
-    pub(super) fn new(seen: &Sighting, camera: &Camera, depth: f64, spread: f64) -> Self {
+    pub(super) fn new(seen: &PosedDetection, camera: &Camera, depth: f64, spread: f64) -> Self {
         let b = &seen.bounding_box;
         let ray = camera.ray(b.centre());
         let eye = seen.world_from_camera.translation;
@@ -183,7 +183,7 @@ pub(super) fn predict(pose: &Se3, quadric: &DualQuadric, camera: &Camera) -> Opt
 pub(super) fn fit(
     belief: &ObjectPrior,
     start: DualQuadric,
-    seen: &[Sighting],
+    seen: &[PosedDetection],
     camera: &Camera,
     noise: &BoxNoise,
 ) -> Option<FittedEllipsoid> {
@@ -220,7 +220,7 @@ impl NormalEquations {
     fn new(
         belief: &ObjectPrior,
         quadric: &DualQuadric,
-        seen: &[Sighting],
+        seen: &[PosedDetection],
         camera: &Camera,
         noise: &BoxNoise,
     ) -> Self {
@@ -258,7 +258,7 @@ struct WhitenedResidual {
 
 impl WhitenedResidual {
     /// Returns `None` if the ellipsoid has no box in this image.
-    fn new(quadric: &DualQuadric, seen: &Sighting, camera: &Camera, noise: &BoxNoise) -> Option<Self> {
+    fn new(quadric: &DualQuadric, seen: &PosedDetection, camera: &Camera, noise: &BoxNoise) -> Option<Self> {
         let predicted = predict(&seen.world_from_camera, quadric, camera)?;
         let mut all = Self { square: 0.0, gradient: Vector9::zeros(), h: Matrix9::zeros() };
         all.add(
@@ -287,7 +287,7 @@ impl WhitenedResidual {
 /// Returns the squared whitened residual of a detection under Cauchy's loss.
 pub(super) fn squared_error(
     quadric: &DualQuadric,
-    seen: &Sighting,
+    seen: &PosedDetection,
     camera: &Camera,
     noise: &BoxNoise,
 ) -> f64 {
@@ -306,10 +306,10 @@ mod tests {
     const NOISE: BoxNoise = BoxNoise { px: 2.0, of_size: 0.02, others: MeasurementSigmas { depth: 0.03 } };
 
     /// A camera that is `x` metres to the right and looks straight ahead.
-    fn sighting_at(x: f64, frame: usize, quadric: &DualQuadric) -> Sighting {
+    fn detection_at(x: f64, frame: usize, quadric: &DualQuadric) -> PosedDetection {
         let world_from_camera = Se3 { translation: Vector3::x() * x, ..Se3::identity() };
         let bounding_box = predict(&world_from_camera, quadric, &CAMERA).unwrap().bounding_box;
-        Sighting { frame, world_from_camera, bounding_box, quantities: Quantities::NONE }
+        PosedDetection { frame, world_from_camera, bounding_box, quantities: Quantities::NONE }
     }
 
     fn ball(z: f64) -> DualQuadric {
@@ -319,7 +319,7 @@ mod tests {
 
     #[test]
     fn one_box_says_all_but_the_depth() {
-        let first = sighting_at(0.0, 0, &ball(2.0));
+        let first = detection_at(0.0, 0, &ball(2.0));
         let belief = ObjectPrior::new(&first, &CAMERA, 3.0, 0.5);
         let found = fit(&belief, belief.initial_quadric(), &[first], &CAMERA, &NOISE).unwrap();
         let away = found.quadric.centroid();
@@ -332,19 +332,19 @@ mod tests {
 
     #[test]
     fn boxes_from_the_side_say_the_depth() {
-        let sightings: Vec<_> =
-            (0..8).map(|i| sighting_at(0.1 * f64::from(i), i as usize, &ball(2.0))).collect();
-        let belief = ObjectPrior::new(&sightings[0], &CAMERA, 3.0, 0.5);
-        let found = fit(&belief, belief.initial_quadric(), &sightings, &CAMERA, &NOISE).unwrap();
+        let detections: Vec<_> =
+            (0..8).map(|i| detection_at(0.1 * f64::from(i), i as usize, &ball(2.0))).collect();
+        let belief = ObjectPrior::new(&detections[0], &CAMERA, 3.0, 0.5);
+        let found = fit(&belief, belief.initial_quadric(), &detections, &CAMERA, &NOISE).unwrap();
         assert!((found.quadric.centroid() - ball(2.0).centroid()).norm() < 0.1, "{}", found.quadric);
         assert!(found.covariance[(5, 5)].sqrt() < 0.15);
-        assert!(squared_error(&found.quadric, &sightings[7], &CAMERA, &NOISE) < 1.0);
-        assert!(squared_error(&ball(4.0), &sightings[7], &CAMERA, &NOISE) > 10.0);
+        assert!(squared_error(&found.quadric, &detections[7], &CAMERA, &NOISE) < 1.0);
+        assert!(squared_error(&ball(4.0), &detections[7], &CAMERA, &NOISE) > 10.0);
     }
 
     #[test]
     fn derivatives_of_a_belief_are_right() {
-        let belief = ObjectPrior::new(&sighting_at(0.0, 0, &ball(2.0)), &CAMERA, 3.0, 0.5);
+        let belief = ObjectPrior::new(&detection_at(0.0, 0, &ball(2.0)), &CAMERA, 3.0, 0.5);
         check_derivatives(&belief);
         let covariance = Matrix9::from_fn(|r, c| if r == c { 0.04 } else { 0.01 });
         check_derivatives(&ObjectPrior::from_estimate(&FittedEllipsoid { quadric: ball(2.0), covariance }));

@@ -2,7 +2,7 @@
 use super::super::MapEstimate;
 use super::LikelihoodAssociation;
 use super::fit::{BoxNoise, FittedEllipsoid, ObjectPrior, PredictedBox, SIDES, fit, predict};
-use super::sightings::{Sighting, Sightings};
+use super::posed_detections::{PosedDetection, PosedDetections};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
@@ -24,10 +24,10 @@ pub(super) struct Track {
     pub votes: IndexMap<String, f64>,
     pub belief: ObjectPrior,
     pub fitted: FittedEllipsoid,
-    pub sightings: Sightings,
+    pub detections: PosedDetections,
     /// All its boxes, at most one per frame, in order.
     pub boxes: Vec<TrackBox>,
-    /// Time of the last sighting, in seconds.
+    /// Time of the last detection, in seconds.
     pub last_seen_s: Option<f64>,
     /// Number of boxes at which it is compared with its neighbours again.
     pub next_merge_check: usize,
@@ -69,7 +69,7 @@ impl Track {
     pub(super) fn new(
         id: ObjectId,
         belief: ObjectPrior,
-        first: &Sighting,
+        first: &PosedDetection,
         camera: &Camera,
         noise: &BoxNoise,
     ) -> Option<Self> {
@@ -84,7 +84,7 @@ impl Track {
             votes: IndexMap::new(),
             belief,
             fitted,
-            sightings: Sightings::default(),
+            detections: PosedDetections::default(),
             boxes: vec![],
             last_seen_s: None,
             next_merge_check: FIRST_MERGE_CHECK_BOXES,
@@ -127,7 +127,7 @@ impl Track {
 
     /// Returns the standard deviation of the centre, relative to the distance from the last camera.
     pub(super) fn relative_centre_sigma(&self) -> f64 {
-        let last = self.sightings.all().last();
+        let last = self.detections.all().last();
         let distance = last.map_or(0.0, |last| self.distance(&last.world_from_camera));
         self.centre_covariance().trace().sqrt() / distance
     }
@@ -151,7 +151,7 @@ impl Track {
         if all > 0.0 { self.votes.get(class).copied().unwrap_or_default() / all } else { 1.0 }
     }
 
-    /// Predicts the box seen from `pose`, `seconds` after the last sighting; `None` if the object is not
+    /// Predicts the box seen from `pose`, `seconds` after the last detection; `None` if the object is not
     /// visible.
     pub(super) fn expected_box<'a>(
         &'a self,
@@ -173,9 +173,9 @@ impl Track {
     }
 
     /// Returns the intersection over union of a box with the projection of the ellipsoid.
-    pub(super) fn overlap(&self, sighting: &Sighting, camera: &Camera) -> f64 {
-        let predicted = predict(&sighting.world_from_camera, &self.fitted.quadric, camera);
-        predicted.map_or(0.0, |predicted| predicted.bounding_box.iou(&sighting.bounding_box))
+    pub(super) fn overlap(&self, detection: &PosedDetection, camera: &Camera) -> f64 {
+        let predicted = predict(&detection.world_from_camera, &self.fitted.quadric, camera);
+        predicted.map_or(0.0, |predicted| predicted.bounding_box.iou(&detection.bounding_box))
     }
 
     /// Adds a box. If the fit fails, the ellipsoid stays unchanged.
@@ -188,15 +188,15 @@ impl Track {
         noise: &BoxNoise,
     ) {
         self.last_seen_s = Some(seen.timestamp);
-        self.sightings.update_poses(map);
-        self.sightings.add(seen.from(pose), &self.fitted.quadric.centroid());
+        self.detections.update_poses(map);
+        self.detections.add(seen.from(pose), &self.fitted.quadric.centroid());
         self.boxes.push(seen);
         self.refit(camera, noise);
     }
 
-    /// Fits the ellipsoid to the sightings, from the current one.
+    /// Fits the ellipsoid to the detections, from the current one.
     pub(super) fn refit(&mut self, camera: &Camera, noise: &BoxNoise) {
-        let fitted = fit(&self.belief, self.fitted.quadric, self.sightings.all(), camera, noise);
+        let fitted = fit(&self.belief, self.fitted.quadric, self.detections.all(), camera, noise);
         self.fitted = fitted.unwrap_or(self.fitted);
     }
 
@@ -223,10 +223,10 @@ impl TrackBox {
         self.detection.frame
     }
 
-    /// Returns the sighting with the given camera pose.
-    pub(super) fn from(&self, world_from_camera: Se3) -> Sighting {
+    /// Returns the detection with the given camera pose.
+    pub(super) fn from(&self, world_from_camera: Se3) -> PosedDetection {
         let Detection { frame, bounding_box, ref quantities, .. } = self.detection;
-        Sighting { frame, world_from_camera, bounding_box, quantities: quantities.clone() }
+        PosedDetection { frame, world_from_camera, bounding_box, quantities: quantities.clone() }
     }
 }
 

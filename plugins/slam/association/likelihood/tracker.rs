@@ -2,8 +2,8 @@
 use super::super::{Associator, Corrections, FrameDetections, MapEstimate, best_assignment};
 use super::LikelihoodAssociation;
 use super::fit::ObjectPrior;
-use super::second_look::PendingFrame;
-use super::sightings::Sighting;
+use super::posed_detections::PosedDetection;
+use super::reassociation::PendingFrame;
 use super::track::{Track, TrackBox};
 use manifactor_geometry::Se3;
 use manifactor_quadric::Camera;
@@ -18,11 +18,11 @@ use std::sync::Arc;
 const MAX_BOXES_PER_FRAME: usize = 200;
 /// Number of boxes below which an object is forgotten when it is not seen for `TENTATIVE_TIMEOUT_S`.
 pub(super) const CONFIRMED_TRACK_BOXES: usize = 3;
-/// Time without a sighting after which such an object is forgotten, in seconds.
+/// Time without a detection after which such an object is forgotten, in seconds.
 const TENTATIVE_TIMEOUT_S: f64 = 10.0;
 /// Maximum number of such objects.
 const MAX_TENTATIVE_TRACKS: usize = 500;
-/// Age of the last sighting of prior objects at the start of a run, in seconds. It sets the uncertainty of
+/// Age of the last detection of prior objects at the start of a run, in seconds. It sets the uncertainty of
 /// the start pose in the prior map.
 const PRIOR_OBJECT_AGE_S: f64 = 30.0;
 /// Relative uncertainty of the place, below which an object contributes to the usual depth.
@@ -37,9 +37,9 @@ pub(super) struct Tracker {
     /// Sorted by id at the front: the objects of a prior map.
     pub tracks: Vec<Track>,
     pub next: u32,
-    /// Nominal time of the last sighting of prior objects, in seconds.
+    /// Nominal time of the last detection of prior objects, in seconds.
     start_time: Option<f64>,
-    /// Frames that wait for their second look.
+    /// Frames that wait for their reassociation.
     pub pending_frames: VecDeque<PendingFrame>,
 }
 
@@ -219,10 +219,10 @@ impl Tracker {
         near.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
     }
 
-    /// Returns the index of an object, and creates it from this sighting if it is new.
-    fn find_or_create_track(&mut self, id: ObjectId, first: &Sighting, depth: f64) -> Option<usize> {
+    /// Returns the index of an object, and creates it from this detection if it is new.
+    fn find_or_create_track(&mut self, id: ObjectId, first: &PosedDetection, depth: f64) -> Option<usize> {
         self.track_index(id).or_else(|| {
-            // the sighting carries the uncertainty of a measured depth
+            // the detection carries the uncertainty of a measured depth
             let depth = first.quantities.depth().unwrap_or(depth);
             let belief = ObjectPrior::new(first, &self.camera, depth, *self.settings.depth_spread);
             self.tracks.push(Track::new(id, belief, first, &self.camera, &self.settings.noise())?);

@@ -263,7 +263,7 @@ impl ObjectMeasurements {
     }
 
     /// Returns the larger of the standard deviations of box width and height, in pixels; 0 without boxes.
-    pub fn box_deviation(&self) -> f64 {
+    pub(crate) fn box_deviation(&self) -> f64 {
         let of = |size: fn(&BoundingBox) -> f64| {
             let sizes = self.views.iter().map(|view| size(&view.bounding_box));
             let n = self.views.len().max(1) as f64;

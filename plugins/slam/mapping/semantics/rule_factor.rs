@@ -78,7 +78,7 @@ impl RuleFactor {
     }
 
     /// Returns the number of further objects that the factor connects with the object.
-    pub fn partners(&self) -> usize {
+    pub(crate) fn partners(&self) -> usize {
         self.variables.iter().filter(|id| **id == TypeId::of::<DualQuadric>()).count().saturating_sub(1)
     }
 

@@ -70,7 +70,7 @@ const SIDES: usize = 4;
 
 impl DetectionSettings {
     /// Returns the noise of a box with these of its sides inside the image.
-    pub fn noise_of(&self, inside: [bool; 4]) -> Noise {
+    pub(crate) fn noise_of(&self, inside: [bool; 4]) -> Noise {
         match self.cut_sides {
             CutSides::Mask if inside.contains(&false) => self.noise.clone().observing(&inside),
             _ => self.noise.clone(),

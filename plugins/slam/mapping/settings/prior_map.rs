@@ -100,7 +100,7 @@ impl PriorMapSettings {
 
     /// Returns an object of the map with its covariance enlarged by `sigma_scale` and `shape_error`. Maps are
     /// written with the covariance that was read, because each reader applies its own settings.
-    pub fn inflated_object(&self, object: &PriorObject) -> PriorObject {
+    pub(crate) fn inflated_object(&self, object: &PriorObject) -> PriorObject {
         object.inflated(*self.sigma_scale, *self.shape_error)
     }
 

@@ -1,6 +1,6 @@
 //! The map that a run writes for later runs.
 use manifactor_graph::{FactorEntry, Graph, Key, Noise};
-use manifactor_mapping::estimate::looks::{ObjectLooks, count_looks};
+use manifactor_mapping::estimate::visibility::{DetectionOpportunities, count_opportunities};
 use manifactor_mapping::estimate::{Estimate, LandmarkEstimate};
 use manifactor_mapping::mapping::measurements::ObjectMeasurements;
 use manifactor_mapping::mapping::object_key;
@@ -39,26 +39,31 @@ const UNOBSERVED_SIGMAS: [f64; 9] = [1.0, 1.0, 1.0, 10.0, 10.0, 10.0, 1.0, 1.0, 
 /// # Errors
 /// If the covariances cannot be computed.
 pub fn map_of(estimate: &Estimate, settings: &RunSettings) -> Result<PriorMap, MapError> {
-    let new = count_looks(estimate, *settings.detections.border_px);
+    let new = count_opportunities(estimate, *settings.detections.border_px);
     let mut covariances = covariances(estimate)?;
     let object = |landmark: LandmarkEstimate<'_>| {
         let LandmarkEstimate { object, quadric, .. } = landmark;
         let measured = estimate.mapping.measurements.object(object.id)?;
-        let looked = new.get(&object.id).copied().unwrap_or_default();
-        if is_gone(measured, looked, settings) {
+        let opportunities = new.get(&object.id).copied().unwrap_or_default();
+        if is_gone(measured, opportunities, settings) {
             return None;
         }
-        let looks = measured.prior.as_ref().map(|prior| prior.looks).unwrap_or_default().plus(looked.all);
+        let detection_counts = measured
+            .prior
+            .as_ref()
+            .map(|prior| prior.detection_counts)
+            .unwrap_or_default()
+            .plus(opportunities.all);
         if let Some(prior) = measured.prior.as_ref().filter(|_| measured.views.is_empty()) {
             let classes = measured.classes().clone();
-            return Some(Arc::new(PriorObject { classes, looks, ..PriorObject::clone(prior) }));
+            return Some(Arc::new(PriorObject { classes, detection_counts, ..PriorObject::clone(prior) }));
         }
         Some(Arc::new(PriorObject {
             id: object.id,
             classes: measured.classes().clone(),
             quadric: *quadric,
             covariance: covariances.remove(object.key.as_str())?,
-            looks,
+            detection_counts,
             least_px: measured.least_px(),
         }))
     };
@@ -66,29 +71,35 @@ pub fn map_of(estimate: &Estimate, settings: &RunSettings) -> Result<PriorMap, M
     Ok(PriorMap::new(estimate.mapping.frame.up, objects))
 }
 
-/// An object counts as gone if the probability of missing it in all looks since its last detection is smaller
-/// than this.
+/// An object counts as gone if the probability of missing it at all opportunities since its last detection is
+/// smaller than this.
 const MAX_MISS_PROBABILITY: f64 = 0.001;
-/// Smallest number of looks since its last detection at which an object can count as gone.
-const MIN_LOOKS: usize = 8;
+/// Smallest number of opportunities since its last detection at which an object can count as gone.
+const MIN_OPPORTUNITIES: usize = 8;
 
 /// Returns the numbers of mapped objects that are gone.
 pub(super) fn gone_objects(estimate: &Estimate, settings: &RunSettings) -> Vec<ObjectId> {
-    let looks = count_looks(estimate, *settings.detections.border_px);
-    let is_gone = |(id, looked): (ObjectId, ObjectLooks)| {
+    let all = count_opportunities(estimate, *settings.detections.border_px);
+    let is_gone = |(id, opportunities): (ObjectId, DetectionOpportunities)| {
         let measured = estimate.mapping.measurements.object(id)?;
-        is_gone(measured, looked, settings).then_some(id)
+        is_gone(measured, opportunities, settings).then_some(id)
     };
-    looks.into_iter().filter_map(is_gone).collect()
+    all.into_iter().filter_map(is_gone).collect()
 }
 
 /// Returns whether an object is gone: at its detection rate so far, it should have been detected again since
 /// its last detection in this run or before, but was not.
-fn is_gone(measured: &ObjectMeasurements, looked: ObjectLooks, settings: &RunSettings) -> bool {
-    let prior = measured.prior.as_ref().map(|prior| prior.looks).unwrap_or_default();
-    let missed = (1.0 - prior.plus(looked.before).detection_rate()).powf(looked.since as f64);
+fn is_gone(
+    measured: &ObjectMeasurements,
+    opportunities: DetectionOpportunities,
+    settings: &RunSettings,
+) -> bool {
+    let prior = measured.prior.as_ref().map(|prior| prior.detection_counts).unwrap_or_default();
+    let missed = (1.0 - prior.plus(opportunities.before).detection_rate()).powf(opportunities.since as f64);
     // held-out boxes do not count as missed
-    settings.evaluation.holdout.is_none() && looked.since >= MIN_LOOKS && missed < MAX_MISS_PROBABILITY
+    settings.evaluation.holdout.is_none()
+        && opportunities.since >= MIN_OPPORTUNITIES
+        && missed < MAX_MISS_PROBABILITY
 }
 
 /// Gives the factors of the prior map the covariances that were read, without the settings' `sigma_scale` and

@@ -29,7 +29,7 @@ pub(super) struct Notes {
 
 impl Notes {
     /// Adds the events of a frame. `now` maps an object to its current id, and `class` a key to its class.
-    pub(super) fn take<'a>(
+    pub(super) fn add_events<'a>(
         &mut self,
         report: &FrameReport,
         now: impl Fn(ObjectId) -> ObjectId,
@@ -41,7 +41,7 @@ impl Notes {
             let (frames, newest) = (self.left_out, std::mem::take(&mut self.newest));
             *self = Self { left_out: frames, refused: frames, newest, ..Self::default() };
             let matches = located.matches.len();
-            self.note(frame, &format!("the place in the prior map is found, by {matches} objects; from now on, ids and poses are those of that map"));
+            self.add_note(frame, &format!("the place in the prior map is found, by {matches} objects; from now on, ids and poses are those of that map"));
         }
         self.born += report.initialized.len();
         self.withdrawn += report.removed.len();
@@ -50,10 +50,10 @@ impl Notes {
         self.forgotten += report.forgotten.len();
         for key in &report.initialized {
             let class = class(key).map(|class| format!(" ({class})")).unwrap_or_default();
-            self.note(frame, &format!("{key}{class} was added to the map"));
+            self.add_note(frame, &format!("{key}{class} was added to the map"));
         }
         for key in &report.removed {
-            self.note(
+            self.add_note(
                 frame,
                 &format!(
                     "{key} was removed: its boxes show several objects, or belong to another object now"
@@ -61,13 +61,13 @@ impl Notes {
             );
         }
         for DetectionMove { frame: of, from, into, .. } in &report.moved {
-            self.note(frame, &format!("a box of frame {of} shows object {into}, not {from}"));
+            self.add_note(frame, &format!("a box of frame {of} shows object {into}, not {from}"));
         }
         for merge in &report.merged {
-            self.note(frame, &format!("object {} was merged into {}", merge.from, now(merge.into)));
+            self.add_note(frame, &format!("object {} was merged into {}", merge.from, now(merge.into)));
         }
         for id in &report.forgotten {
-            self.note(frame, &format!("object {id} was dropped: it has too few detections"));
+            self.add_note(frame, &format!("object {id} was dropped: it has too few detections"));
         }
         for update in &report.updates {
             self.rejected += update.rejected.len();
@@ -76,29 +76,29 @@ impl Notes {
                 [(&update.rejected, "rejected as outliers"), (&update.readmitted, "readmitted")]
             {
                 if !factors.is_empty() {
-                    self.note(frame, &format!("factors {what}: {}", factors.len()));
+                    self.add_note(frame, &format!("factors {what}: {}", factors.len()));
                 }
             }
         }
         for refused in &report.refused {
-            self.refused(frame, refused);
+            self.add_refused(frame, refused);
         }
     }
 
-    /// Counts and notes a frame that was refused.
-    pub(super) fn left_out(&mut self, frame: usize, text: &str) {
+    /// Counts a frame that was refused, and adds a note.
+    pub(super) fn add_skipped_frame(&mut self, frame: usize, text: &str) {
         self.left_out += 1;
-        self.refused(frame, text);
+        self.add_refused(frame, text);
     }
 
-    /// Counts and notes refused input.
-    fn refused(&mut self, frame: usize, text: &str) {
+    /// Counts refused input, and adds a note.
+    fn add_refused(&mut self, frame: usize, text: &str) {
         self.refused += 1;
-        self.note(frame, text);
+        self.add_note(frame, text);
     }
 
     /// Adds a note. The text may be foreign and of any length.
-    fn note(&mut self, frame: usize, text: &str) {
+    fn add_note(&mut self, frame: usize, text: &str) {
         let text: String = text.chars().take(LONGEST).collect();
         if self.newest.len() == KEPT {
             self.newest.pop_front();

@@ -20,8 +20,8 @@ fn before_the_first_frame_there_is_a_map_of_nothing() {
 #[test]
 fn a_phase_keeps_the_cost_that_is_known() {
     let mut map = LiveMap::new("desk", "only");
-    map.enter(Phase::Solving { iteration: 3 }, Some(2.5));
-    map.enter(Phase::Ended("all is written".to_owned()), None);
+    map.set_phase(Phase::Solving { iteration: 3 }, Some(2.5));
+    map.set_phase(Phase::Ended("all is written".to_owned()), None);
     let state = map.to_json();
     assert_eq!((&state["phase"], &state["words"]), (&"ended".into(), &"all is written".into()));
     assert_eq!(state["cost"], 2.5);
@@ -51,7 +51,7 @@ impl StreamWatcher for Shown {
         seconds: f64,
     ) -> ControlFlow<()> {
         let before: Vec<Se3> = self.live.path.frames().map(|frame| frame.odometry.pose).collect();
-        self.live.frame(report, observation, mapper, seconds);
+        self.live.add_frame(report, observation, mapper, seconds);
         let Some(located) = report.ok().and_then(|report| report.located.as_ref()) else {
             return ControlFlow::Continue(());
         };

@@ -71,7 +71,7 @@ impl VarianceComponents {
     ///
     /// # Errors
     /// If the estimate has no covariance.
-    pub fn estimate_from(
+    pub(crate) fn estimate_from(
         estimate: &Estimate,
         settings: &VarianceSettings,
         loss: Option<&Arc<dyn Loss>>,
@@ -112,7 +112,7 @@ impl VarianceComponents {
     ///
     /// # Errors
     /// If a standard deviation is zero or not finite.
-    pub fn apply_to_graph(
+    pub(crate) fn apply_to_graph(
         &self,
         mapping: &mut Mapping,
         settings: &VarianceSettings,
@@ -146,7 +146,7 @@ impl VarianceComponents {
     }
 
     /// Returns the largest relative change of a standard deviation of boxes.
-    pub fn largest_change(&self, before: &Self) -> f64 {
+    pub(crate) fn largest_change(&self, before: &Self) -> f64 {
         let boxes = self.boxes.iter().filter_map(|(name, now)| {
             before.boxes.get(name).map(|before| (&now.effective_px, &before.effective_px))
         });

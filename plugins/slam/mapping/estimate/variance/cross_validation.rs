@@ -41,7 +41,7 @@ pub struct CrossValidationScore {
 
 impl CrossValidationScore {
     /// Returns whether the trajectory is significantly better than the odometry.
-    pub fn is_better(&self) -> bool {
+    pub(crate) fn is_better(&self) -> bool {
         self.cost < -SIGNIFICANCE_SIGMAS * self.deviation
     }
 }

@@ -6,7 +6,7 @@
 use super::layout::{AlignedLayout, Layout};
 use crate::mapper::Mapper;
 use manifactor_geometry::Se3;
-use manifactor_mapping::estimate::looks::{ExpectedObject, VisibleObject, visit_visible_objects};
+use manifactor_mapping::estimate::visibility::{ExpectedObject, VisibleObject, visit_visible_objects};
 use manifactor_mapping::mapping::measurements::ObjectBox;
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, DualQuadric};
 use manifactor_recording::prior_map::{PriorMap, PriorObject};
@@ -90,7 +90,7 @@ impl Mapper {
         visit_visible_objects(&objects, poses, &self.camera, *border, |sight| {
             let Some(object) = map.object(sight.id) else { return };
             if sight.begins {
-                expected += object.looks.detection_rate();
+                expected += object.detection_counts.detection_rate();
                 is_seen.remove(&sight.id);
             }
             if !is_seen.contains(&sight.id) && self.is_shown(&sight, object, layout) {

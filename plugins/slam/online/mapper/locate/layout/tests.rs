@@ -1,7 +1,7 @@
 use super::*;
 use manifactor_geometry::So3;
 use manifactor_recording::class::ClassAliases;
-use manifactor_recording::prior_map::LookCounts;
+use manifactor_recording::prior_map::DetectionCounts;
 use manifactor_recording::sequence::ClassScores;
 
 /// An agreement that accepts every pose.
@@ -18,7 +18,7 @@ fn object(id: u32, class: &str, centre: Vector3<f64>) -> Arc<PriorObject> {
         classes,
         quadric,
         covariance,
-        looks: LookCounts::default(),
+        detection_counts: DetectionCounts::default(),
         least_px: None,
     })
 }

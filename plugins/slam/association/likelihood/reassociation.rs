@@ -1,10 +1,10 @@
-//! Second look: frames are assigned once more with later knowledge.
+//! Reassociation: the detections of a frame are assigned a second time, with later knowledge.
 use super::super::{Associator, DetectionMove, FrameDetections, MapEstimate, ObjectMerge};
 use super::track::TrackBox;
 use super::tracker::Tracker;
 use manifactor_recording::sequence::{Detection, ObjectId};
 
-/// A frame that waits for its second look, with the current objects of its detections.
+/// A frame that waits for its reassociation, with the current objects of its detections.
 #[derive(Debug)]
 pub(super) struct PendingFrame {
     frame: usize,
@@ -36,7 +36,7 @@ impl PendingFrame {
 }
 
 impl Tracker {
-    /// Takes a second look at all frames that are old enough, and moves boxes that show a different object.
+    /// Reassociates the detections of all frames that are old enough, and moves boxes that show a different object.
     pub(super) fn reassociate_old_frames(&mut self, now: f64, map: &dyn MapEstimate) -> Vec<DetectionMove> {
         let (mut all, until) = (vec![], now - *self.settings.second_look_s);
         while let Some(past) = self.pending_frames.pop_front_if(|past| past.timestamp <= until) {
@@ -79,7 +79,7 @@ impl Tracker {
         let is_it = |seen: &TrackBox| seen.frame() == moved.frame && seen.index == moved.index;
         let place = track.boxes.iter().position(is_it)?;
         let seen = track.boxes.remove(place);
-        track.sightings.remove(moved.frame);
+        track.detections.remove(moved.frame);
         track.refit(&self.camera, &self.settings.noise());
         Some(seen)
     }

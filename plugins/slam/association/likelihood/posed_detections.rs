@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 /// A box with the camera pose that it was seen from.
 #[derive(Debug, Clone)]
-pub(super) struct Sighting {
+pub(super) struct PosedDetection {
     pub frame: usize,
     pub world_from_camera: Se3,
     pub bounding_box: BoundingBox,
@@ -16,36 +16,36 @@ pub(super) struct Sighting {
     pub quantities: Quantities,
 }
 
-impl Sighting {
+impl PosedDetection {
     /// Returns the number of residual rows.
     pub(super) fn rows(&self) -> usize {
         SIDES + self.quantities.rows()
     }
 }
 
-/// A few sightings from different sides, including the latest.
+/// A few detections from different sides, including the latest.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Sightings(Vec<Sighting>);
+pub(super) struct PosedDetections(Vec<PosedDetection>);
 
-/// Maximum number of sightings.
-const MAX_SIGHTINGS: usize = 24;
-/// Change of direction at which a sighting is new information, in radians.
+/// Maximum number of detections.
+const MAX_DETECTIONS: usize = 24;
+/// Change of direction at which a detection is new information, in radians.
 const NEW_DIRECTION_RAD: f64 = 0.03;
-/// Logarithmic change of the distance at which a sighting is new information.
+/// Logarithmic change of the distance at which a detection is new information.
 const NEW_LOG_DISTANCE: f64 = 0.1;
-/// Number of frames after which a sighting is new information, because the detector errs differently by then.
+/// Number of frames after which a detection is new information, because the detector errs differently by then.
 const NEW_AFTER_FRAMES: usize = 30;
 
-impl Sightings {
-    pub(super) fn all(&self) -> &[Sighting] {
+impl PosedDetections {
+    pub(super) fn all(&self) -> &[PosedDetection] {
         &self.0
     }
 
-    /// Adds a sighting of an object at `centre`. The previous one stays only if it adds information to the
+    /// Adds a detection of an object at `centre`. The previous one stays only if it adds information to the
     /// rest.
-    pub(super) fn add(&mut self, sighting: Sighting, centre: &Vector3<f64>) {
+    pub(super) fn add(&mut self, detection: PosedDetection, centre: &Vector3<f64>) {
         if let Some((last, rest)) = self.0.split_last() {
-            let from = |s: &Sighting| s.world_from_camera.translation - centre;
+            let from = |s: &PosedDetection| s.world_from_camera.translation - centre;
             let is_new = rest.iter().all(|other| {
                 let (a, b) = (from(last), from(other));
                 a.angle(&b) > NEW_DIRECTION_RAD
@@ -56,25 +56,25 @@ impl Sightings {
                 self.0.pop();
             }
         }
-        self.0.push(sighting);
+        self.0.push(detection);
         self.thin(centre);
     }
 
-    /// Removes the sighting of a frame.
+    /// Removes the detection of a frame.
     pub(super) fn remove(&mut self, frame: usize) {
-        self.0.retain(|sighting| sighting.frame != frame);
+        self.0.retain(|detection| detection.frame != frame);
     }
 
-    /// Returns the sightings of both, in the order of frames.
-    pub(super) fn union_with(&self, others: &Self) -> Self {
-        let mut all: Vec<Sighting> = self.0.iter().chain(&others.0).cloned().collect();
-        all.sort_by_key(|sighting| sighting.frame);
+    /// Returns the detections of both, in the order of frames.
+    pub(super) fn merged_with(&self, others: &Self) -> Self {
+        let mut all: Vec<PosedDetection> = self.0.iter().chain(&others.0).cloned().collect();
+        all.sort_by_key(|detection| detection.frame);
         Self(all)
     }
 
-    /// Removes the sightings whose direction differs least from a neighbour, until few enough remain.
+    /// Removes the detections whose direction differs least from a neighbour, until few enough remain.
     pub(super) fn thin(&mut self, centre: &Vector3<f64>) {
-        while self.0.len() > MAX_SIGHTINGS {
+        while self.0.len() > MAX_DETECTIONS {
             let from = |i: usize| self.0[i].world_from_camera.translation - centre;
             let news = |i: usize| {
                 let own = from(i);
@@ -87,9 +87,9 @@ impl Sightings {
 
     /// Replaces the poses by their current estimates.
     pub(super) fn update_poses(&mut self, map: &dyn MapEstimate) {
-        for sighting in &mut self.0 {
-            if let Some(pose) = map.pose(sighting.frame) {
-                sighting.world_from_camera = pose;
+        for detection in &mut self.0 {
+            if let Some(pose) = map.pose(detection.frame) {
+                detection.world_from_camera = pose;
             }
         }
     }

@@ -3,15 +3,15 @@ use crate::estimate::{Estimate, LandmarkEstimate};
 use crate::mapping::measurements::{ObjectBox, ObjectMeasurements};
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
-use manifactor_recording::prior_map::LookCounts;
+use manifactor_recording::prior_map::DetectionCounts;
 use manifactor_recording::sequence::ObjectId;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 /// Change of the viewing direction at which a new opportunity begins, in radians.
-const NEW_LOOK_RAD: f64 = 0.1;
+const NEW_OPPORTUNITY_RAD: f64 = 0.1;
 /// Time after which a new opportunity begins, in seconds: the detector errs differently by then.
-const NEW_LOOK_S: f64 = 1.0;
+const NEW_OPPORTUNITY_S: f64 = 1.0;
 /// An object is occluded if a nearer object covers more than this share of its outline.
 const MAX_OCCLUDED_SHARE: f64 = 0.2;
 /// An object is too far away to be detected if its outline is smaller than this share of its smallest box so
@@ -24,11 +24,11 @@ const SAME_DIRECTION_RAD: f64 = 0.26;
 
 /// Opportunities to detect an object.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct ObjectLooks {
-    /// All looks.
-    pub all: LookCounts,
+pub struct DetectionOpportunities {
+    /// All opportunities.
+    pub all: DetectionCounts,
     /// Opportunities that began before the last detection.
-    pub before: LookCounts,
+    pub before: DetectionCounts,
     /// Later opportunities from a direction with an earlier detection. All later ones if the object has no
     /// detections.
     pub since: usize,
@@ -36,21 +36,21 @@ pub struct ObjectLooks {
 
 /// Opportunities so far. The last one continues.
 #[derive(Default)]
-struct LookCounter {
-    looked: ObjectLooks,
+struct OpportunityCounter {
+    opportunities: DetectionOpportunities,
     seen_from: Vec<Vector3<f64>>,
     is_seen: bool,
 }
 
-impl LookCounter {
+impl OpportunityCounter {
     /// Starts a new opportunity.
-    fn start_look(&mut self, views: &[ObjectBox], sight: &VisibleObject) {
-        self.looked.all.expected += 1;
+    fn start_opportunity(&mut self, views: &[ObjectBox], sight: &VisibleObject) {
+        self.opportunities.all.expected += 1;
         let is_near = || self.seen_from.iter().any(|seen| seen.angle(&sight.from) < SAME_DIRECTION_RAD);
         match views.last() {
-            Some(last) if sight.frame <= last.frame => self.looked.before.expected += 1,
-            Some(_) => self.looked.since += usize::from(is_near()),
-            None => self.looked.since += 1,
+            Some(last) if sight.frame <= last.frame => self.opportunities.before.expected += 1,
+            Some(_) => self.opportunities.since += usize::from(is_near()),
+            None => self.opportunities.since += 1,
         }
         self.is_seen = false;
     }
@@ -58,8 +58,8 @@ impl LookCounter {
     /// Records a detection in the current opportunity.
     fn record_detection(&mut self, from: Vector3<f64>) {
         if !self.is_seen {
-            self.looked.all.seen += 1;
-            self.looked.before.seen += 1;
+            self.opportunities.all.seen += 1;
+            self.opportunities.before.seen += 1;
             self.seen_from.push(from);
             self.is_seen = true;
         }
@@ -67,7 +67,7 @@ impl LookCounter {
 }
 
 /// Returns the opportunities to detect each mapped object, from the estimated poses and objects.
-pub fn count_looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, ObjectLooks> {
+pub fn count_opportunities(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, DetectionOpportunities> {
     let measured = |id: ObjectId| estimate.mapping.measurements.object(id);
     let expected = |landmark: &LandmarkEstimate<'_>| {
         let id = landmark.object.id;
@@ -76,18 +76,18 @@ pub fn count_looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, Objec
     let objects: Vec<ExpectedObject> = estimate.landmarks().iter().map(expected).collect();
     let trajectory = estimate.trajectory();
     let poses = trajectory.iter().enumerate().map(|(frame, at)| (frame, at.timestamp, at.pose));
-    let mut all: BTreeMap<ObjectId, LookCounter> = BTreeMap::new();
+    let mut all: BTreeMap<ObjectId, OpportunityCounter> = BTreeMap::new();
     visit_visible_objects(&objects, poses, &estimate.sequence.camera, border, |sight| {
         let counted = all.entry(sight.id).or_default();
         let views = measured(sight.id).map_or(&[][..], |measured| &measured.views);
         if sight.begins {
-            counted.start_look(views, &sight);
+            counted.start_opportunity(views, &sight);
         }
         if views.binary_search_by_key(&sight.frame, |view| view.frame).is_ok() {
             counted.record_detection(sight.from);
         }
     });
-    all.into_iter().map(|(id, counted)| (id, counted.looked)).collect()
+    all.into_iter().map(|(id, counted)| (id, counted.opportunities)).collect()
 }
 
 /// A frame with a visible object.
@@ -116,15 +116,15 @@ pub fn visit_visible_objects(
     mut visit: impl FnMut(VisibleObject),
 ) {
     // start time and first direction of the current opportunity
-    let mut looks: BTreeMap<ObjectId, (f64, Vector3<f64>)> = BTreeMap::new();
+    let mut current: BTreeMap<ObjectId, (f64, Vector3<f64>)> = BTreeMap::new();
     for (frame, seconds, pose) in frames {
         for (id, from) in in_view(objects, &pose, camera, border) {
             let goes_on = |(began, first): &(f64, Vector3<f64>)| {
-                seconds - began < NEW_LOOK_S && first.angle(&from) < NEW_LOOK_RAD
+                seconds - began < NEW_OPPORTUNITY_S && first.angle(&from) < NEW_OPPORTUNITY_RAD
             };
-            let begins = !looks.get(&id).is_some_and(goes_on);
+            let begins = !current.get(&id).is_some_and(goes_on);
             if begins {
-                looks.insert(id, (seconds, from));
+                current.insert(id, (seconds, from));
             }
             visit(VisibleObject { id, frame, pose, from, begins });
         }

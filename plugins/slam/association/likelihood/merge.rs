@@ -1,8 +1,8 @@
-//! Merging: two objects that are one.
+//! Merging of two tracks that show one object.
 use super::super::ObjectMerge;
 use super::LikelihoodAssociation;
 use super::fit::{FittedEllipsoid, fit, squared_error};
-use super::sightings::{Sighting, Sightings};
+use super::posed_detections::{PosedDetection, PosedDetections};
 use super::track::{Track, TrackBox};
 use super::tracker::Tracker;
 use manifactor_quadric::Camera;
@@ -64,16 +64,16 @@ impl Tracker {
     fn merge_with_neighbour(&mut self, id: ObjectId) -> Option<ObjectMerge> {
         // an earlier merge may have removed it
         let own = self.track_index(id)?;
-        let unions = self.neighbours(own).into_iter().filter_map(|other| {
+        let merges = self.neighbours(own).into_iter().filter_map(|other| {
             let (one, two) = (&self.tracks[own], &self.tracks[other]);
             Some((other, try_merge(one, two, &self.camera, &self.settings)?))
         });
-        let (other, union) = unions.min_by(|(_, a), (_, b)| a.error.total_cmp(&b.error))?;
-        let gone = if union.track.id == id { other } else { own };
+        let (other, merged) = merges.min_by(|(_, a), (_, b)| a.error.total_cmp(&b.error))?;
+        let gone = if merged.track.id == id { other } else { own };
         let stays = own + other - gone;
-        let merge = ObjectMerge { from: self.tracks[gone].id, into: union.track.id };
+        let merge = ObjectMerge { from: self.tracks[gone].id, into: merged.track.id };
         self.pending_frames.iter_mut().for_each(|past| past.apply_merge(merge));
-        self.tracks[stays] = union.track;
+        self.tracks[stays] = merged.track;
         self.tracks.remove(gone);
         Some(merge)
     }
@@ -110,27 +110,27 @@ fn try_merge(
 ) -> Option<MergedTrack> {
     let rank = |track: &Track| (track.is_known(), track.boxes.len());
     let (more, fewer) = if rank(one) >= rank(two) { (one, two) } else { (two, one) };
-    let (noise, mut sightings) = (settings.noise(), more.sightings.union_with(&fewer.sightings));
+    let (noise, mut detections) = (settings.noise(), more.detections.merged_with(&fewer.detections));
     // start from both ellipsoids, since boxes of one object may look like outliers from the other
     let starts = [more, fewer].into_iter().filter_map(|start| {
         let mut fitted = start.fitted;
         // the way from the ellipsoid of one object to the common one may be long
         for _ in 0..2 {
-            fitted = fit(&more.belief, fitted.quadric, sightings.all(), camera, &noise)?;
+            fitted = fit(&more.belief, fitted.quadric, detections.all(), camera, &noise)?;
         }
         Some(fitted)
     });
     let cost = |fitted: &FittedEllipsoid| -> f64 {
-        sightings.all().iter().map(|seen| squared_error(&fitted.quadric, seen, camera, &noise)).sum()
+        detections.all().iter().map(|seen| squared_error(&fitted.quadric, seen, camera, &noise)).sum()
     };
     let fitted = starts.min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
-    let error_of = |sightings: &Sightings| {
-        let error = |seen: &Sighting| squared_error(&fitted.quadric, seen, camera, &noise);
-        let all = sightings.all();
-        let rows: usize = all.iter().map(Sighting::rows).sum();
+    let error_of = |detections: &PosedDetections| {
+        let error = |seen: &PosedDetection| squared_error(&fitted.quadric, seen, camera, &noise);
+        let all = detections.all();
+        let rows: usize = all.iter().map(PosedDetection::rows).sum();
         all.iter().map(error).sum::<f64>() / rows.max(1) as f64
     };
-    let error = error_of(&more.sightings).max(error_of(&fewer.sightings));
+    let error = error_of(&more.detections).max(error_of(&fewer.detections));
     let limit = match class_similarity(more, fewer) {
         alike if alike < DIFFERENT_CLASS_SIMILARITY => *settings.merge_error / DIFFERENT_CLASS_FACTOR,
         alike if alike > SAME_CLASS_SIMILARITY && more.overlaps(fewer) => {
@@ -150,9 +150,9 @@ fn try_merge(
     track.boxes.dedup_by_key(|seen| seen.frame());
     track.last_seen_s = more.last_seen_s.into_iter().chain(fewer.last_seen_s).reduce(f64::max);
     track.next_merge_check = track.next_merge_check.max(fewer.next_merge_check);
-    sightings.thin(&fitted.quadric.centroid());
-    track.fitted = fit(&more.belief, fitted.quadric, sightings.all(), camera, &noise)?;
-    track.sightings = sightings;
+    detections.thin(&fitted.quadric.centroid());
+    track.fitted = fit(&more.belief, fitted.quadric, detections.all(), camera, &noise)?;
+    track.detections = detections;
     Some(MergedTrack { track, error })
 }
 
