@@ -1,5 +1,5 @@
-//! Tests of the whole workspace: its layers, its catalogue, numbers at their limits, and the corpus of the
-//! fuzzers.
+//! Tests of the whole workspace: its layers, its catalogue, the links of its pages, numbers at their limits,
+//! and the corpus of the fuzzers.
 #![allow(
     missing_docs,
     clippy::unwrap_used,
@@ -14,5 +14,6 @@ mod expression;
 mod figures;
 #[path = "fuzz/replay.rs"]
 mod fuzz;
+mod links;
 mod numbers;
 mod rooms;

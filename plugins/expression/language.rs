@@ -6,15 +6,14 @@ use std::fmt::Write;
 const MEANING: &str = "\
 A formula of named variables: a factor in a config, without a compiler.
 
-`variables` names the factor's keys, in their order, and says of which type each is. Each formula of `residual` is a \
-number or a vector, one row or several. Numbers are `1`, `0.5`, `1e-3`; vectors `[0, 0, 1]`; operators `+ - * / ^`, of \
-which `^` binds most. Names are those of the variables, of `constants`, `pi`, and `up`, the world's up: where a semantic \
-rule leaves it open, it gets the run's gravity. A constant may be a number, a vector, or a value with its `type`; `define` gives names to parts of formulas. \
-Formulas are checked when they are read, and compiled once; their derivatives are exact.
+`variables` has a name and a type for each key of the factor, in the order of the keys. Each formula of `residual` is a \
+number or a vector, one row or several. Numbers are `1`, `0.5`, `1e-3`; vectors `[0, 0, 1]`; operators `+ - * / ^`. The \
+operator `^` has the highest precedence. Names are the variables, the `constants`, `pi`, and `up`, the world's up. If a \
+semantic rule gives no `up`, the run's gravity defines it. A constant is a number, a vector, or a value with its `type`. \
+`define` gives names to parts of formulas. The reader checks and compiles each formula once; derivatives are exact.
 
-It is defined where all formulas of `domain` are above zero, and everywhere, where there are none. Division by zero, \
-the root of a negative number and the like are not a domain: they end a solve as not finite. Kinks are those of the \
-functions.
+The factor is defined if all formulas of `domain` are positive, and everywhere without `domain`. Division by zero or the \
+root of a negative number is no domain: a solve that meets one ends as not finite. Kinks come from the functions alone.
 
 ```toml
 [[factors]]

@@ -205,7 +205,7 @@ pub(crate) fn known(kind: &str, name: &str) -> PyResult<()> {
         return Ok(());
     }
     let names: Vec<&str> = entries(kind).iter().map(|entry| entry.name).collect();
-    let mistake = Mistake::at("type", format!("no {kind} is called `{name}`"));
+    let mistake = Mistake::at("type", format!("unknown {kind} `{name}`"));
     let meant =
         nearest(name, names.iter().copied()).map_or(String::new(), |near| format!("did you mean `{near}`? "));
     Err(errors::arguments("", vec![mistake.help(format!("{meant}there are {}", names.join(", ")))]))

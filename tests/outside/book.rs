@@ -1,7 +1,6 @@
 //! The TOML blocks of the book, as a reader would copy them.
 use manifactor::config::{Document, Format, Node, Reader, Value};
 use manifactor::graph::catalogue::{self, Entry};
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -95,20 +94,8 @@ fn the_summary_has_every_page_and_no_other() {
     }
 }
 
-/// Returns the anchors of a page's headings, as in mdBook and GitHub.
-fn anchors(page: &str) -> Vec<String> {
-    let mut met: HashMap<String, usize> = HashMap::new();
-    let anchor = |heading: &str| {
-        let text = heading.trim_start_matches('#').trim().to_lowercase().replace(' ', "-");
-        let name: String = text.chars().filter(|c| c.is_alphanumeric() || "_-".contains(*c)).collect();
-        let before = *met.entry(name.clone()).and_modify(|n| *n += 1).or_insert(0);
-        if before == 0 { name } else { format!("{name}-{before}") }
-    };
-    page.lines().filter(|line| line.starts_with('#')).map(anchor).collect()
-}
-
 #[test]
-fn every_link_within_the_book_leads_somewhere() {
+fn no_link_of_the_book_leads_out_of_it() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
     let (mut found, mut count) = (vec![], 0);
     pages(&docs, &mut found);
@@ -118,13 +105,12 @@ fn every_link_within_the_book_leads_somewhere() {
             if link.starts_with("http") || link.contains(' ') {
                 continue;
             }
-            let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
+            // `tests/links.rs` checks the anchors
+            let file = link.split_once('#').map_or(link, |(file, _)| file);
             let target = if file.is_empty() { page.clone() } else { page.parent().unwrap().join(file) };
             let place = format!("{}: {link}", page.display());
             let target = target.canonicalize().unwrap_or_else(|_| panic!("{place} leads nowhere"));
             assert!(target.starts_with(docs.canonicalize().unwrap()), "{place} leads out of the book");
-            let known = || anchors(&std::fs::read_to_string(&target).unwrap());
-            assert!(anchor.is_empty() || known().iter().any(|a| a == anchor), "{place} has no such heading");
             count += 1;
         }
     }

@@ -16,10 +16,11 @@ pub struct ChordalBetween<G> {
 
 fn description<G: LieGroup>() -> String {
     format!(
-        "The second pose is at `relative`, seen from the first, by chords: r = ((R_b - R_a Z)/√2, R_aᵀ(t_b - t_a) \
-         - z).\n\nRows: the entries of the rotation's difference, by columns, then the translation's in metres. \
-         The first together are as long as 2 sin(θ/2) for an angle θ: as the angle itself, where it is small, \
-         and smooth everywhere. What the certificate of global optimality speaks of.\n\n```toml\n[[factors]]\n\
+        "The second pose is at `relative` in the frame of the first, with the chordal distance of rotations: \
+         r = ((R_b - R_a Z)/√2, R_aᵀ(t_b - t_a) - z).\n\nRows: the entries of the rotation's difference, by \
+         columns, then the translation's in metres. The norm of the first entries is 2 sin(θ/2) for an angle θ: \
+         close to the angle if it is small, and smooth everywhere. The certificate of global optimality refers \
+         to this factor.\n\n```toml\n[[factors]]\n\
          keys = [\"x0\", \"x1\"]\nfactor = {{ type = \"chordal_between_{}\", relative = {} }}\n\
          noise = {{ sigma = 0.1 }}\n```",
         G::NAME,

@@ -350,9 +350,9 @@ def centroid_depth(*, depth: float) -> Factor:
 
 
 def chordal_between_se2(*, relative: variables.Se2 | Fields) -> Factor:
-    """The second pose is at `relative`, seen from the first, by chords: r = ((R_b - R_a Z)/√2, R_aᵀ(t_b - t_a) - z).
+    """The second pose is at `relative` in the frame of the first, with the chordal distance of rotations: r = ((R_b - R_a Z)/√2, R_aᵀ(t_b - t_a) - z).
 
-    Rows: the entries of the rotation's difference, by columns, then the translation's in metres. The first together are as long as 2 sin(θ/2) for an angle θ: as the angle itself, where it is small, and smooth everywhere. What the certificate of global optimality speaks of.
+    Rows: the entries of the rotation's difference, by columns, then the translation's in metres. The norm of the first entries is 2 sin(θ/2) for an angle θ: close to the angle if it is small, and smooth everywhere. The certificate of global optimality refers to this factor.
 
     ```toml
     [[factors]]
@@ -368,9 +368,9 @@ def chordal_between_se2(*, relative: variables.Se2 | Fields) -> Factor:
 
 
 def chordal_between_se3(*, relative: variables.Se3 | Fields) -> Factor:
-    """The second pose is at `relative`, seen from the first, by chords: r = ((R_b - R_a Z)/√2, R_aᵀ(t_b - t_a) - z).
+    """The second pose is at `relative` in the frame of the first, with the chordal distance of rotations: r = ((R_b - R_a Z)/√2, R_aᵀ(t_b - t_a) - z).
 
-    Rows: the entries of the rotation's difference, by columns, then the translation's in metres. The first together are as long as 2 sin(θ/2) for an angle θ: as the angle itself, where it is small, and smooth everywhere. What the certificate of global optimality speaks of.
+    Rows: the entries of the rotation's difference, by columns, then the translation's in metres. The norm of the first entries is 2 sin(θ/2) for an angle θ: close to the angle if it is small, and smooth everywhere. The certificate of global optimality refers to this factor.
 
     ```toml
     [[factors]]
@@ -469,9 +469,9 @@ def expression(
 ) -> Factor:
     """A formula of named variables: a factor in a config, without a compiler.
 
-    `variables` names the factor's keys, in their order, and says of which type each is. Each formula of `residual` is a number or a vector, one row or several. Numbers are `1`, `0.5`, `1e-3`; vectors `[0, 0, 1]`; operators `+ - * / ^`, of which `^` binds most. Names are those of the variables, of `constants`, `pi`, and `up`, the world's up: where a semantic rule leaves it open, it gets the run's gravity. A constant may be a number, a vector, or a value with its `type`; `define` gives names to parts of formulas. Formulas are checked when they are read, and compiled once; their derivatives are exact.
+    `variables` has a name and a type for each key of the factor, in the order of the keys. Each formula of `residual` is a number or a vector, one row or several. Numbers are `1`, `0.5`, `1e-3`; vectors `[0, 0, 1]`; operators `+ - * / ^`. The operator `^` has the highest precedence. Names are the variables, the `constants`, `pi`, and `up`, the world's up. If a semantic rule gives no `up`, the run's gravity defines it. A constant is a number, a vector, or a value with its `type`. `define` gives names to parts of formulas. The reader checks and compiles each formula once; derivatives are exact.
 
-    It is defined where all formulas of `domain` are above zero, and everywhere, where there are none. Division by zero, the root of a negative number and the like are not a domain: they end a solve as not finite. Kinks are those of the functions.
+    The factor is defined if all formulas of `domain` are positive, and everywhere without `domain`. Division by zero or the root of a negative number is no domain: a solve that meets one ends as not finite. Kinks come from the functions alone.
 
     ```toml
     [[factors]]

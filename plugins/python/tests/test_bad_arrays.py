@@ -165,5 +165,5 @@ def test_a_mistake_says_what_to_do() -> None:
         mf.bounding_box(box=[0, 0, 1, 1], camera={"fx": 1, "fy": 1, "cx": 0, "cy": 0, "width": 9, "hight": 9})  # type: ignore[typeddict-unknown-key, typeddict-item]
     places = {mistake.place: mistake for mistake in raised.value.mistakes}
     assert places["camera.hight"].help is not None and "did you mean `height`?" in places["camera.hight"].help
-    with pytest.raises(mf.ArgumentError, match="no factor is called `betwen_se3`.*did you mean `between_se3`"):
+    with pytest.raises(mf.ArgumentError, match="unknown factor `betwen_se3`.*did you mean `between_se3`"):
         mf.Factor("betwen_se3")

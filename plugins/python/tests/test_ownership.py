@@ -130,7 +130,7 @@ def test_poses_of_no_values_are_empty() -> None:
     for of in (mf.Point3, "so3", mf.Plane):
         with pytest.raises(mf.ArgumentError, match="expected a type of poses.*se2, se3"):
             mf.poses(values, of)
-    with pytest.raises(mf.ArgumentError, match="no variable is called `se4`"):
+    with pytest.raises(mf.ArgumentError, match="unknown variable `se4`"):
         mf.poses(values, "se4")
 
 

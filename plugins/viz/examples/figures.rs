@@ -58,7 +58,7 @@ fn main() -> Fallible<()> {
     let names: Vec<String> = std::env::args().skip(1).collect();
     if let Some(unknown) = names.iter().find(|name| FIGURES.iter().all(|(own, _)| own != name)) {
         let known: Vec<&str> = FIGURES.iter().map(|(name, _)| *name).collect();
-        return Err(format!("no figure is called {unknown}; there are {}", known.join(", ")).into());
+        return Err(format!("unknown figure {unknown}; there are {}", known.join(", ")).into());
     }
     for (name, draw) in FIGURES.iter().filter(|(name, _)| names.is_empty() || names.iter().any(|n| n == name))
     {

@@ -41,7 +41,12 @@ impl Notes {
             let (frames, newest) = (self.left_out, std::mem::take(&mut self.newest));
             *self = Self { left_out: frames, refused: frames, newest, ..Self::default() };
             let matches = located.matches.len();
-            self.add_note(frame, &format!("the place in the prior map is found, by {matches} objects; from now on, ids and poses are those of that map"));
+            self.add_note(
+                frame,
+                &format!(
+                    "relocalized in the prior map by {matches} objects; ids and poses now refer to that map"
+                ),
+            );
         }
         self.born += report.initialized.len();
         self.withdrawn += report.removed.len();

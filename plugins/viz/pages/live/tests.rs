@@ -67,7 +67,7 @@ impl StreamWatcher for Shown {
             assert_eq!(Some(frame.estimate.pose), mapper.pose_of(i));
         }
         let notes = self.live.notes.to_json();
-        assert!(notes["newest"].to_string().contains("the place in the prior map is found"), "{notes}");
+        assert!(notes["newest"].to_string().contains("relocalized in the prior map"), "{notes}");
         // objects that were added to the discarded map are not counted
         assert_eq!(notes["counts"]["born"], report.map_or(0, |report| report.initialized.len()));
         ControlFlow::Continue(())
