@@ -28,7 +28,7 @@ BRIEF = {
 }
 HEAD = """# Python API
 
-`python -m manifactor._generate` writes this page. [Python](../python.md) is the guide, and [config](../config.md) has the fields of every factor.
+`python -m manifactor._generate` writes this page. [Python](../python.md) is the guide, and [config](config.md) has the fields of every factor.
 """
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef

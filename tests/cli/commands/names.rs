@@ -105,9 +105,10 @@ fn a_wrong_command_line_is_exit_code_2() {
 
 #[test]
 fn the_generated_pages_of_the_docs_are_up_to_date() {
-    for (page, command) in
-        [("docs/config.md", "list --markdown"), ("docs/reference/command-line.md", "man --markdown")]
-    {
+    for (page, command) in [
+        ("docs/reference/config.md", "list --markdown"),
+        ("docs/reference/command-line.md", "man --markdown"),
+    ] {
         let written = std::fs::read_to_string(crate::root().join(page)).unwrap();
         let now = manifactor(command).ended(0).stdout;
         let first = now.lines().zip(written.lines()).find(|(now, written)| now != written);

@@ -20,8 +20,8 @@ fn commands(page: &Path) -> Vec<String> {
 
 #[test]
 fn every_command_of_the_book_is_understood() {
-    let docs = root().join("docs");
-    let pages = std::fs::read_dir(&docs).unwrap().map(|entry| entry.unwrap().path());
+    let folders = ["docs", "docs/reference"].map(|folder| root().join(folder));
+    let pages = folders.iter().flat_map(|f| std::fs::read_dir(f).unwrap()).map(|entry| entry.unwrap().path());
     let pages = pages.filter(|p| p.extension().is_some_and(|e| e == "md")).chain([root().join("README.md")]);
     let mut count = 0;
     for (page, command) in pages.flat_map(|p| commands(&p).into_iter().map(move |c| (p.clone(), c))) {

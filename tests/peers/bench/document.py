@@ -1,4 +1,4 @@
-"""Writes docs/benchmarks.md and docs/benchmarks-methods.md."""
+"""Writes docs/benchmarks.md and docs/reference/benchmarks-methods.md."""
 
 from pathlib import Path
 
@@ -33,7 +33,7 @@ AUTO = Path(__file__).resolve().parent.parent / "auto.md"
 
 METHODS = """# Benchmarks: every method
 <!-- written by `tests/peers/run --write`; change that, not this -->
-All methods on each problem of the [benchmarks](benchmarks.md), which say how they were measured: those that reach the best known cost first,
+All methods on each problem of the [benchmarks](../benchmarks.md), which say how they were measured: those that reach the best known cost first,
 the fastest first.
 """
 
@@ -46,7 +46,7 @@ def render(all_measured, stop, machine, solvers, repeat):
         INTRODUCTION.format(**vars(stop), **machine, repeat=repeat),
         "## How fast is the default solver?",
         tables.summary(all_measured, default),
-        "[Every method on every problem](benchmarks-methods.md), with stages and memory.",
+        "[Every method on every problem](reference/benchmarks-methods.md), with stages and memory.",
         "## How does time grow with size?",
         "Cubes of poses with loop closures, off their optimum by as much at each pose whatever the size.",
         tables.growth(all_measured, *GROWING[0]),
@@ -60,7 +60,7 @@ def render(all_measured, stop, machine, solvers, repeat):
         *(tables.summary(all_measured, solver) for solver in others),
         *(tables.of_problem(measured) for measured in all_measured),
     ]
-    return {"benchmarks.md": joined(page), "benchmarks-methods.md": joined(methods)}
+    return {"benchmarks.md": joined(page), "reference/benchmarks-methods.md": joined(methods)}
 
 
 def joined(sections):

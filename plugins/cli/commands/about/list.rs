@@ -22,7 +22,7 @@ pub(crate) struct List {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Print the config reference of everything that is linked, as Markdown (docs/config.md).
+    /// Print the config reference of everything that is linked, as Markdown (docs/reference/config.md).
     #[arg(long, conflicts_with_all = ["json", "kind"])]
     markdown: bool,
 }
