@@ -192,11 +192,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_similarity_is_found_again(rotation in any_so3(), translation in vector::<3>(3.0), scale in 0.1..10.0, seed in prop::collection::vec((vector::<3>(1.0), 0.1..3.0), 4..9)) {
+        fn a_similarity_is_found_again(rotation in any_so3(), translation in vector::<3>(3.0), scale in 0.1..10.0, seed in prop::collection::vec((vector::<3>(1.0), 0.1..3.0), 1..6)) {
             let truth = Similarity { scale, rotation, translation };
-            let found = PointPairs::new(seed.iter().map(|(x, w)| (*x, truth.act(x), *w))).similarity(1e-6);
-            prop_assume!(found.is_some());
-            let found = found.unwrap();
+            // Corners keep the points apart: rounding decides about points that almost coincide.
+            let corners = [Vector3::zeros(), Vector3::x(), Vector3::y()].map(|x| (x, 1.0));
+            let points = corners.into_iter().chain(seed);
+            let found = PointPairs::new(points.map(|(x, w)| (x, truth.act(&x), w))).similarity(1e-6).unwrap();
             prop_assert!((found.scale / scale - 1.0).abs() < 1e-9 && found.rotation.local(&rotation).norm() < 1e-6);
             prop_assert!((found.translation - translation).norm() < 1e-6 * (1.0 + scale));
         }

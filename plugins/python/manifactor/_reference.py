@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import copy
 import inspect
 from pathlib import Path
 
@@ -31,49 +32,42 @@ HEAD = """# Python API
 `python -m manifactor._generate` writes this page. [Python](../python.md) is the guide, and [config](config.md) has the fields of every factor.
 """
 
-Function = ast.FunctionDef | ast.AsyncFunctionDef
 
-
-def public(body: list[ast.stmt]) -> list[ast.stmt]:
+def public(body: list[ast.stmt]) -> list[ast.FunctionDef | ast.ClassDef]:
     """Returns the public functions and classes of a module or a class, and constructors."""
     named = [s for s in body if isinstance(s, (ast.FunctionDef, ast.ClassDef))]
     return [s for s in named if not s.name.startswith("_") or s.name in ("__init__", "__new__")]
 
 
-def is_property(function: Function) -> bool:
-    return any(isinstance(d, ast.Name) and d.id == "property" for d in function.decorator_list)
-
-
-def arguments_of(function: Function, method: bool) -> str:
-    """Returns the arguments with their types and defaults, without `self` or `cls`."""
-    text = ast.unparse(function.args)
-    return text.partition(",")[2].strip() if method and "," in text else "" if method else text
-
-
-def signature(function: Function, owner: str = "") -> str:
-    result = f" -> {ast.unparse(function.returns)}" if function.returns else ""
+def signature(function: ast.FunctionDef, owner: str = "") -> str:
+    """Returns the name, the arguments without `self` or `cls`, and the result. `owner` is the class of a method."""
+    decorators = {ast.unparse(decorator) for decorator in function.decorator_list}
+    arguments = copy.deepcopy(function.args)
+    if owner and "staticmethod" not in decorators:
+        del (arguments.posonlyargs or arguments.args)[0]
+    result = ast.unparse(function.returns) if function.returns else ""
     if function.name in ("__init__", "__new__"):
-        return f"{owner}({arguments_of(function, True)})"
-    if is_property(function):
-        return f"{function.name}{result.replace(' -> ', ': ')}"
-    return f"{function.name}({arguments_of(function, bool(owner))}){result}"
+        return f"{owner}({ast.unparse(arguments)})"
+    if "property" in decorators:
+        return f"{function.name}: {result}"
+    name = f"{owner}.{function.name}" if "staticmethod" in decorators else function.name
+    return f"{name}({ast.unparse(arguments)})" + (f" -> {result}" if result else "")
 
 
-def about(node: ast.AST) -> str:
-    assert isinstance(node, (ast.FunctionDef, ast.ClassDef))
+def about(node: ast.FunctionDef | ast.ClassDef) -> str:
+    """Returns the docstring without indentation."""
     return inspect.cleandoc(ast.get_docstring(node) or "")
 
 
-def paragraph(node: ast.AST) -> str:
+def paragraph(node: ast.FunctionDef | ast.ClassDef) -> str:
     """Returns the first paragraph of a docstring on one line."""
     return " ".join(about(node).split("\n\n")[0].split())
 
 
-def entries(statement: ast.stmt) -> list[str]:
+def entries(statement: ast.FunctionDef | ast.ClassDef) -> list[str]:
     """Returns the lines for a function, or for a class and its methods."""
     if isinstance(statement, ast.FunctionDef):
         return [f"### {statement.name}", "", "```python", signature(statement), "```", "", about(statement), ""]
-    assert isinstance(statement, ast.ClassDef)
     lines = [f"### {statement.name}", "", about(statement), ""]
     for method in public(statement.body):
         if isinstance(method, ast.FunctionDef):
@@ -82,7 +76,8 @@ def entries(statement: ast.stmt) -> list[str]:
     return [*lines, ""]
 
 
-def statements(module: str) -> list[ast.stmt]:
+def statements(module: str) -> list[ast.FunctionDef | ast.ClassDef]:
+    """Returns the public functions and classes of a module of the package."""
     return public(ast.parse((HERE / module).read_text(encoding="utf-8")).body)
 
 
@@ -103,7 +98,7 @@ def page() -> str:
         lines += [f"## {heading}", ""]
         for module in modules:
             names = exported(module)
-            chosen = [s for s in statements(module) if getattr(s, "name", "") in names]
+            chosen = [s for s in statements(module) if s.name in names]
             lines += [line for statement in chosen for line in entries(statement)]
     for heading, module in MODULES.items():
         lines += [f"## {heading}", ""]
@@ -111,7 +106,6 @@ def page() -> str:
     for heading, module in BRIEF.items():
         lines += [f"## {heading}", ""]
         for statement in statements(module):
-            assert isinstance(statement, (ast.FunctionDef, ast.ClassDef))
             lines.append(f"- `{statement.name}`: {paragraph(statement)}")
         lines.append("")
     text = "\n".join(lines).rstrip() + "\n"

@@ -11,7 +11,10 @@ mod ground_truth;
 mod source;
 mod vector;
 
-pub(crate) use source::SourceGravity;
+pub use accelerometer::AccelerometerGravity;
+pub use ground_truth::GroundTruthGravity;
+pub use source::SourceGravity;
+pub use vector::VectorGravity;
 
 /// A method to find the up direction. Chosen by name in `[gravity]` of a run.
 #[typetag::serialize(tag = "type")]

@@ -11,8 +11,9 @@ use std::sync::Arc;
 mod constant_velocity;
 mod odometry;
 
+pub use constant_velocity::ConstantVelocityMotion;
 pub use manifactor_recording::keys::pose_key;
-pub(crate) use odometry::OdometryMotion;
+pub use odometry::OdometryMotion;
 
 /// A model of the motion between consecutive frames. Chosen by name in `[motion]` of a run.
 #[typetag::serialize(tag = "type")]

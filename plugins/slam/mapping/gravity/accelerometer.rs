@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Accelerometer")]
-pub(crate) struct AccelerometerGravity {
+pub struct AccelerometerGravity {
     /// Largest time difference to the first frame at which a reading is used. A longer window reduces the
     /// effect of accelerations and increases the effect of odometry drift. Unit: seconds.
     pub window: NotNegative,

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "GroundTruthPose")]
-pub(crate) struct GroundTruthGravity {
+pub struct GroundTruthGravity {
     /// Largest time difference between that pose and the first frame. Unit: seconds.
     pub max_time_difference: NotNegative,
 }

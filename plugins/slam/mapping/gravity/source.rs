@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "FromSource")]
-pub(crate) struct SourceGravity {}
+pub struct SourceGravity {}
 
 #[typetag::serialize(name = "source")]
 impl Gravity for SourceGravity {

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "UpVector")]
-pub(crate) struct VectorGravity {
+pub struct VectorGravity {
     /// Up direction. Any length except zero.
     pub up: Direction,
 }

@@ -19,7 +19,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "ConstantVelocity")]
-pub(crate) struct ConstantVelocityMotion {
+pub struct ConstantVelocityMotion {
     /// Noise density of the angular acceleration. Unit: rad/s²/√Hz.
     pub angular_acceleration: Positive,
     /// Noise density of the linear acceleration. Unit: m/s²/√Hz.

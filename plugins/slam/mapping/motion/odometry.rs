@@ -14,7 +14,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Odometry")]
-pub(crate) struct OdometryMotion {}
+pub struct OdometryMotion {}
 
 #[typetag::serialize(name = "odometry")]
 impl MotionModel for OdometryMotion {
