@@ -137,7 +137,9 @@ impl From<SourceError> for Failure {
     fn from(error: SourceError) -> Self {
         match error {
             SourceError::Format(error) => error.into(),
-            SourceError::NoFolder { name, tried, no_data_folder } => no_folder(&name, &tried, no_data_folder),
+            SourceError::NoFolder { setting, name, tried, no_data_folder } => {
+                no_folder(setting, &name, &tried, no_data_folder)
+            }
             other => Self::input(other),
         }
     }
@@ -201,20 +203,22 @@ impl From<FormatError> for Failure {
 const LISTED: usize = 3;
 
 /// The error of a data set that is in none of the folders `tried`.
-fn no_folder(name: &Path, tried: &[PathBuf], no_data_folder: bool) -> Failure {
+fn no_folder(setting: &str, name: &Path, tried: &[PathBuf], no_data_folder: bool) -> Failure {
     let mut searched: Vec<String> =
         tried.iter().take(LISTED).map(|path| path.display().to_string()).collect();
     if tried.len() > LISTED {
         searched.push(format!("and {} more", tried.len() - LISTED));
     }
     let help = match no_data_folder {
-        true => {
-            "give the folder of the data sets with --data DIR, or with the environment variable MANIFACTOR_DATA"
-        }
-        false => "check the name, and the folder given by --data or MANIFACTOR_DATA",
+        _ if name.is_absolute() => format!("correct `{setting}`"),
+        true => format!(
+            "correct `{setting}`, or give the folder of the data sets with --data DIR or the environment variable MANIFACTOR_DATA"
+        ),
+        false => format!("correct `{setting}`, or the folder given by --data or MANIFACTOR_DATA"),
     };
-    let message = format!("there is no folder `{}`; searched: {}", name.display(), searched.join(", "));
-    Failure::NotThere { message, help: Some(help.to_owned()) }
+    let (name, searched) = (name.display(), searched.join(", "));
+    let message = format!("there is no folder `{name}`, which `{setting}` names; searched: {searched}");
+    Failure::NotThere { message, help: Some(help) }
 }
 
 /// The remedy for a diagnostic: its own, or one that needs the text of the document.

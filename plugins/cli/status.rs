@@ -47,7 +47,7 @@ impl From<&VariantReport> for Status {
     fn from(report: &VariantReport) -> Self {
         let nothing = report.counts.detections > 0 && report.counts.objects == 0;
         let mapped = if nothing { Self::NothingMapped } else { Self::Done };
-        let is_partial = report.warnings.iter().any(|w| matches!(w, Warning::TooManyUnused { .. }));
+        let is_partial = report.warnings.iter().any(Warning::is_partial);
         let used = if is_partial { Self::DetectionsLeftOut } else { Self::Done };
         let is_lost = report.warnings.iter().any(|w| matches!(w, Warning::JournalIncomplete(_)));
         let kept = if is_lost { Self::JournalIncomplete } else { Self::Done };

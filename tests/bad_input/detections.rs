@@ -64,6 +64,7 @@ fn detections_of_objects() {
         row("no class", "0,,0.9,10,10,50,50,1"),
         row("a time without a pose", "77.5,cup,0.9,10,10,50,50,1"),
         rows("boxes outside of the image", "T,cup,0.9,-900,10,-850,50,1"),
+        rows("shares of the image instead of pixels", "T,cup,0.9,0.1,0.1,0.5,0.4,1"),
         rows("boxes that show nothing but motion", "T,cup,0.9,10,10,50,50,1"),
     ];
     insta::assert_snapshot!(account(cases));

@@ -69,6 +69,55 @@ fn documents_of_runs() {
     insta::assert_snapshot!(account("run.toml", "run FILE --out out", cases));
 }
 
+/// A run of recorded files.
+const RECORDED: &str = r#"[source]
+type = "recorded"
+folder = "recording"
+camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }
+"#;
+
+/// A rule whose factor needs the up direction.
+const UPRIGHT: &str = "[[semantics]]\nclasses = [\"cup\"]\nfactor = { type = \"vertical_orientation\" }\n";
+
+#[test]
+fn up_directions_that_nothing_determines() {
+    let near = "[[semantics]]\nclasses = [\"cup\"]\nnear = { classes = [\"table\"], within_m = 1.0, below = true }\n\
+                factor = { type = \"shape_prior\", semi_axes = [0.1, 0.1, 0.1] }\n";
+    let association = "association = { type = \"likelihood\" }\n";
+    let tum = "source = { type = \"tum\", sequence = \"fr1_desk\", odometry = \"odometry.txt\" }\n";
+    let cases = vec![
+        text("a recording without up", format!("{RECORDED}{UPRIGHT}")),
+        text("a recording without up, with association", format!("{association}{RECORDED}{UPRIGHT}")),
+        text("a condition on the object below", format!("{RECORDED}{near}")),
+        text("a data set without up", format!("{tum}{UPRIGHT}")),
+    ];
+    insta::assert_snapshot!(account("run.toml", "check FILE", cases));
+}
+
+#[test]
+fn files_of_a_recording_that_do_not_exist() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path();
+    std::fs::write(place.join("run.toml"), RECORDED).unwrap();
+    let absolute = RECORDED.replace("\"recording\"", "\"/nowhere\"");
+    std::fs::write(place.join("absolute.toml"), absolute).unwrap();
+    std::fs::create_dir(place.join("recording")).unwrap();
+    let lines = "[source]\ntype = \"json_lines\"\nfile = \"frames.jsonl\"\n\
+                 camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }\n";
+    std::fs::write(place.join("lines.toml"), lines).unwrap();
+    let commands = [
+        "check run.toml",
+        "run run.toml --out out",
+        "check absolute.toml",
+        "run absolute.toml --out out",
+        "check lines.toml",
+        "check run.toml --set source.folder=recordings",
+        "check run.toml --set source.folder=recordings --data .",
+    ];
+    let all = commands.map(|command| format!("$ {command}\n{}\n", ended(place, command, "")));
+    insta::assert_snapshot!(all.concat());
+}
+
 #[test]
 fn places_that_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();

@@ -15,6 +15,7 @@ use manifactor::graph::{Graph, Key, Values};
 use manifactor::quadric::DualQuadric;
 use manifactor::slam::experiment::Experiment;
 use manifactor::slam::run::{MappedSequence, Run as Running};
+use manifactor::slam::source::SourceError;
 use manifactor::solve::{Problem, Silent};
 use serde_json::json;
 
@@ -93,6 +94,24 @@ impl Check {
         let mut found = CheckReport::default();
         found.lines.push(format!("A run of {}.", count(document.variants.len(), "variant")));
         let mut run = Running::new(&document, self.run.data());
+        for variant in &document.variants {
+            match run.find_files(variant) {
+                Ok(()) => {}
+                // a document about a public data set is correct without the data
+                Err(SourceError::NoFolder { setting, name, no_data_folder: true, .. })
+                    if name.is_relative() && !self.load =>
+                {
+                    let name = name.display();
+                    let warning = format!(
+                        "the files of the source are not checked: `{setting}` names `{name}`, which is not beside the document; give the folder of the data sets with --data"
+                    );
+                    if !found.warnings.contains(&warning) {
+                        found.warnings.push(warning);
+                    }
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
         for variant in document.variants.iter().filter(|_| self.load) {
             let mapped = MappedSequence::new(run.sequence(variant)?, &variant.settings, &mut Silent)?;
             let MappedSequence { sequence, mapping, .. } = mapped;

@@ -4,6 +4,7 @@
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, NoDirection};
 use manifactor_recording::sequence::{Frame, Sequence};
+use manifactor_recording::source::SequenceSource;
 use std::fmt::Debug;
 
 mod accelerometer;
@@ -24,6 +25,11 @@ pub trait Gravity: Debug + Send + Sync {
     /// # Errors
     /// If the sequence lacks the required data.
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError>;
+
+    /// Returns whether the up direction may be found in data of `source`.
+    fn may_find_up(&self, _source: &dyn SequenceSource) -> bool {
+        true
+    }
 
     /// Returns the time in a stream after which new data change nothing, in seconds after the first frame.
     fn final_after_s(&self) -> f64 {

@@ -12,7 +12,7 @@ use manifactor_formats::plausible;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::{Prior, Se3};
 use manifactor_graph::{FactorEntry, Graph, Key, Values, Variable};
-use manifactor_quadric::{BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
+use manifactor_quadric::{BoundingBox, BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
 use manifactor_recording::fusion::FusedClass;
 use manifactor_recording::measurement::MeasurementSigmas;
 use manifactor_recording::prior_map::PriorObject;
@@ -209,6 +209,7 @@ impl Mapping {
         let doubts =
             plausible::trajectory_doubts(odometry).into_iter().map(|what| Warning::Implausible { what });
         self.warnings.extend(doubts);
+        self.warnings.extend(image_warning(sequence));
         self.warnings.extend(unused_warnings(sequence, self.measurements.without_area));
         let detected = self.objects.iter().filter(|object| object.detections > 0);
         self.warnings.extend(not_mapped_warnings(
@@ -230,6 +231,30 @@ impl Mapping {
             self.warnings.push(Warning::NotRobust);
         }
     }
+}
+
+/// Largest share of boxes outside of the image that a detector makes by mistake. A box that was rectified may
+/// leave the image.
+const MAX_OUTSIDE_SHARE: f64 = 0.05;
+
+/// Returns a warning if boxes do not fit the image of the camera.
+fn image_warning(sequence: &Sequence) -> Option<Warning> {
+    let (width, height) = (sequence.camera.width, sequence.camera.height);
+    let all = || {
+        let boxes = sequence.detections.iter().map(|detection| &detection.bounding_box);
+        boxes.filter(|b| b.xmin < b.xmax && b.ymin < b.ymax)
+    };
+    let boxes = all().count();
+    let is_normalized = |b: &BoundingBox| b.xmin >= 0.0 && b.ymin >= 0.0 && b.xmax <= 1.0 && b.ymax <= 1.0;
+    if boxes > 0 && all().all(is_normalized) {
+        return Some(Warning::NormalizedBoxes { boxes, image: [width, height] });
+    }
+    let is_outside = |b: &&BoundingBox| {
+        b.xmax <= 0.0 || b.ymax <= 0.0 || b.xmin >= f64::from(width) || b.ymin >= f64::from(height)
+    };
+    let outside = all().filter(is_outside).count();
+    let is_too_many = outside as f64 > MAX_OUTSIDE_SHARE * boxes as f64;
+    is_too_many.then_some(Warning::OutsideImage { outside, boxes, image: [width, height] })
 }
 
 /// Returns warnings about unused detections, one per reason.

@@ -102,6 +102,11 @@ fn contains_class(classes: &[String], class: &str, aliases: &ClassAliases) -> bo
 }
 
 impl SemanticRule {
+    /// Returns whether the rule needs the up direction of the map.
+    pub fn needs_up(&self) -> bool {
+        self.factor.wants_up() || self.near.as_ref().is_some_and(|near| near.below)
+    }
+
     /// Returns whether objects of a class, a name from [`ClassAliases::canonical`], get this factor.
     pub fn applies(&self, class: &str, aliases: &ClassAliases) -> bool {
         contains_class(&self.classes, class, aliases)

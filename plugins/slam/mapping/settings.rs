@@ -1,7 +1,7 @@
 //! The settings of a run: how a sequence becomes a graph, and how the graph is solved.
 use crate::gravity::{Gravity, SourceGravity};
 use crate::motion::{MotionModel, OdometryMotion};
-use crate::semantics::{SemanticRule, add_weak_shape, read_semantics};
+use crate::semantics::{RuleError, SemanticRule, add_weak_shape, read_semantics};
 use manifactor_association::{Association, GivenAssociation};
 use manifactor_config::{Diagnostics, Errors, Fault, Node, Section};
 use manifactor_recording::class::ClassAliases;
@@ -123,6 +123,10 @@ fn default_solver() -> Arc<dyn Optimizer> {
     Arc::new(LevenbergMarquardt { diagonal: DiagonalLimits::EVEN, ..LevenbergMarquardt::default() })
 }
 
+/// Ways to set the up direction.
+const UP_HELP: &str = "set `[gravity]`, for example gravity = { type = \"vector\", up = [0.0, 0.0, 1.0] } in the odometry \
+                       frame; the sources `recorded` and `json_lines` also have a field `up`";
+
 impl RunSettings {
     /// Reads settings. Paths are relative to `folder`.
     ///
@@ -138,6 +142,7 @@ impl RunSettings {
                 prior.read(folder, &settings.aliases, node, &errors)?;
             }
             settings.check_motion(node, &errors);
+            settings.check_up(node, &errors);
             Some(settings)
         });
         errors.finish(settings)
@@ -158,6 +163,19 @@ impl RunSettings {
                 format!("the motion model `{model}` has no odometry whose noise could be estimated");
             let help = "set `variance_components.odometry = false`, or leave `motion` out";
             errors.report(place("variance_components"), Fault::with_help(message, help));
+        }
+    }
+
+    /// Reports rules that need the up direction if nothing can determine it.
+    fn check_up(&self, node: &Node, errors: &Errors) {
+        let map_has_up = self.anchor().is_some_and(|anchor| anchor.map.up.is_some());
+        if map_has_up || self.gravity.may_find_up(&*self.source) {
+            return;
+        }
+        if let Some(rule) = self.semantics.iter().find(|rule| rule.needs_up()) {
+            let error = RuleError::NoUp { factor: rule.factor.factor_type().to_owned() };
+            let place = node.field("semantics").unwrap_or(node).place.clone();
+            errors.report(place, Fault::with_help(error.to_string(), UP_HELP));
         }
     }
 

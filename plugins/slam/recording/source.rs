@@ -38,6 +38,20 @@ pub trait SequenceSource: Debug + Send + Sync {
     fn open(&self, _folders: &InputFolders) -> Result<Option<FrameStream>, SourceError> {
         Ok(None)
     }
+
+    /// Checks that the input files exist, without reading them.
+    ///
+    /// # Errors
+    /// The first folder or file that does not exist.
+    fn find_files(&self, _folders: &InputFolders) -> Result<(), SourceError> {
+        Ok(())
+    }
+
+    /// Returns whether the sequence may have an up direction. The settings of a run are checked with it before
+    /// the data is read.
+    fn may_have_up(&self) -> bool {
+        true
+    }
 }
 
 manifactor_graph::kind!(dyn SequenceSource, "source");
@@ -58,11 +72,12 @@ impl InputFolders {
     }
 
     /// Returns the folder of a data set. The name is an absolute path or a path relative to the document;
-    /// otherwise the data folder is searched, and then the folders in it.
+    /// otherwise the data folder is searched, and then the folders in it. `setting` is the setting that has the
+    /// name, for messages.
     ///
     /// # Errors
     /// If there is none. The error lists the paths that were tried.
-    pub fn data_set(&self, name: &Path) -> Result<PathBuf, SourceError> {
+    pub fn data_set(&self, name: &Path, setting: &'static str) -> Result<PathBuf, SourceError> {
         let mut tried = vec![self.beside_document(name)];
         if let Some(data) = self.data.as_ref().filter(|_| name.is_relative()) {
             tried.push(data.join(name));
@@ -74,7 +89,7 @@ impl InputFolders {
         }
         let found = tried.iter().find(|path| path.is_dir()).cloned();
         let no_data_folder = self.data.is_none();
-        found.ok_or_else(|| SourceError::NoFolder { name: name.to_owned(), tried, no_data_folder })
+        found.ok_or_else(|| SourceError::NoFolder { setting, name: name.to_owned(), tried, no_data_folder })
     }
 }
 
@@ -83,8 +98,10 @@ impl InputFolders {
 #[non_exhaustive]
 pub enum SourceError {
     /// A folder that does not exist.
-    #[error("{}", no_folder(name, tried, *no_data_folder))]
+    #[error("`{setting}` names the folder `{}`, which does not exist; searched: {}", name.display(), paths(tried))]
     NoFolder {
+        /// Setting with the name, for example `source.folder`.
+        setting: &'static str,
         /// Requested name.
         name: PathBuf,
         /// Paths that were tried.
@@ -213,15 +230,27 @@ fn closest(nearest: Option<(f64, f64)>) -> String {
     nearest.map(told).unwrap_or_default()
 }
 
-fn no_folder(name: &Path, tried: &[PathBuf], no_data_folder: bool) -> String {
-    let name = name.display();
-    let tried: Vec<String> = tried.iter().map(|path| format!("\n  {}", path.display())).collect();
-    let data = if no_data_folder {
-        "say where data sets lie with --data FOLDER, or the environment variable MANIFACTOR_DATA"
-    } else {
-        "check the name, and the folder given by --data or MANIFACTOR_DATA"
-    };
-    format!("there is no folder `{name}`: {data}; it was looked for at{}", tried.concat())
+fn paths(tried: &[PathBuf]) -> String {
+    tried.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// Checks that a file exists.
+///
+/// # Errors
+/// If its metadata cannot be read.
+fn check_file(path: &Path) -> Result<(), SourceError> {
+    match std::fs::metadata(path) {
+        Ok(_) => Ok(()),
+        Err(source) => Err(FormatError::Io { path: path.to_owned(), source }.into()),
+    }
+}
+
+/// Checks that the named files in a folder exist.
+///
+/// # Errors
+/// The first file that does not exist.
+fn check_files(folder: &Path, files: &[Option<&Path>]) -> Result<(), SourceError> {
+    files.iter().flatten().try_for_each(|file| check_file(&folder.join(file)))
 }
 
 #[cfg(test)]
@@ -231,8 +260,8 @@ mod tests {
     #[test]
     fn a_folder_that_is_nowhere_is_reported_with_the_places_tried() {
         let folders = InputFolders { data: None, document: "runs".into() };
-        let text = folders.data_set(Path::new("fr1")).unwrap_err().to_string();
-        assert!(text.contains("MANIFACTOR_DATA") && text.ends_with("runs/fr1"), "{text}");
+        let text = folders.data_set(Path::new("fr1"), "source.folder").unwrap_err().to_string();
+        assert!(text.contains("`source.folder`") && text.ends_with("runs/fr1"), "{text}");
     }
 
     #[test]
@@ -243,7 +272,7 @@ mod tests {
         sets.iter().for_each(|set| std::fs::create_dir_all(set).unwrap());
         let folders = InputFolders { data: Some(data), document: runs };
         for (name, set) in ["beside", "direct", "deep"].iter().zip(&sets) {
-            assert_eq!(&folders.data_set(Path::new(name)).unwrap(), set);
+            assert_eq!(&folders.data_set(Path::new(name), "source.folder").unwrap(), set);
         }
     }
 }

@@ -7,7 +7,7 @@ use manifactor_mapping::estimate::{Estimate, EstimateError};
 use manifactor_mapping::mapping::{Mapping, MappingError};
 use manifactor_mapping::settings::RunSettings;
 use manifactor_mapping::settings::run_document::{RunDocument, RunVariant};
-use manifactor_online::FinishError;
+use manifactor_online::{FinishError, FrameError};
 use manifactor_recording::journal::journaled;
 use manifactor_recording::sequence::{Detection, Sequence};
 use manifactor_recording::source::{InputFolders, SourceError};
@@ -53,6 +53,9 @@ pub enum RunError {
     /// A journal for a run with several variants.
     #[error("a journal is that of one variant: name another document, or leave all others out")]
     JournalOfVariants,
+    /// Data association rejected every frame.
+    #[error("no frame can be mapped, all are rejected; the first: {0}")]
+    NoFrameMapped(FrameError),
     /// The map of a stream cannot be finished.
     #[error(transparent)]
     Finish(#[from] FinishError),
@@ -149,6 +152,14 @@ impl<'a> Run<'a> {
     /// [`journal`](manifactor_recording::journal).
     pub fn journal_frames(&mut self, journal: PathBuf) {
         self.journal = Some(journal);
+    }
+
+    /// Checks that the input files of a variant exist, without reading them.
+    ///
+    /// # Errors
+    /// The first folder or file that does not exist.
+    pub fn find_files(&self, variant: &RunVariant) -> Result<(), SourceError> {
+        variant.settings.source.find_files(&self.folders)
     }
 
     /// Returns the sequence of a variant.

@@ -76,7 +76,7 @@ fn only_the_first_searched_folders_are_listed() {
     let data = folder.path().display();
     let ran = manifactor(&format!("run examples/tum/fr1_desk.toml --data {data}")).ended(3);
     ran.complains("and 4 more");
-    ran.complains("check the name, and the folder given by --data or MANIFACTOR_DATA");
+    ran.complains("correct `source.sequence`, or the folder given by --data or MANIFACTOR_DATA");
 }
 
 #[test]

@@ -95,6 +95,13 @@ fn codes(ending: &str) -> Vec<i32> {
             assert_eq!(code(&format!("{run} --set source.max_without_pose=1.0")), 0);
             codes(&[run])
         }
+        "many boxes lie outside of the image" => {
+            let small = "--set source.camera.width=300 --set source.camera.cx=150";
+            code("simulate @seen.toml --out @sim");
+            let run = "run @late.toml --out @out --force --set objects.min_views=1";
+            assert_eq!(code(run), 0);
+            codes(&[&format!("{run} {small}")])
+        }
         "a journal cannot be kept" => {
             let online = "online @seen.toml --out @out --force --set objects.min_views=1 --journal";
             assert_eq!(code(&format!("{online} @frames.jsonl")), 0);

@@ -1,6 +1,7 @@
 use super::{Gravity, GravityError, MapFrame};
 use manifactor_graph::register;
 use manifactor_recording::sequence::Sequence;
+use manifactor_recording::source::SequenceSource;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +21,10 @@ pub struct SourceGravity {}
 impl Gravity for SourceGravity {
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
         Ok(MapFrame::of_odometry(sequence.up))
+    }
+
+    fn may_find_up(&self, source: &dyn SequenceSource) -> bool {
+        source.may_have_up()
     }
 }
 register!(dyn Gravity, "source", SourceGravity);

@@ -34,6 +34,22 @@ pub enum Warning {
         /// Expected share, from 0 to 1.
         allowed: f64,
     },
+    /// Boxes that do not overlap the image of the camera, more than a detector makes by mistake.
+    OutsideImage {
+        /// Number of such boxes.
+        outside: usize,
+        /// Number of all boxes.
+        boxes: usize,
+        /// Width and height of the image. Unit: pixels.
+        image: [u32; 2],
+    },
+    /// Boxes that all lie between 0 and 1: shares of the image instead of pixels.
+    NormalizedBoxes {
+        /// Number of boxes.
+        boxes: usize,
+        /// Width and height of the image. Unit: pixels.
+        image: [u32; 2],
+    },
     /// Detected objects that are not mapped, for one reason.
     NotMapped {
         /// The reason, with the number and keys of the objects.
@@ -106,6 +122,13 @@ pub enum Warning {
     },
 }
 
+impl Warning {
+    /// Returns whether the map lacks a part of the detections that was expected in it.
+    pub fn is_partial(&self) -> bool {
+        matches!(self, Self::TooManyUnused { .. } | Self::OutsideImage { .. } | Self::NormalizedBoxes { .. })
+    }
+}
+
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -121,6 +144,16 @@ impl fmt::Display for Warning {
             Self::TooManyUnused { what, allowed } => {
                 write!(f, "{what}; `source.max_without_pose` expects a larger share than {allowed}")
             }
+            Self::OutsideImage { outside, boxes, image: [width, height] } => write!(
+                f,
+                "{outside} of {boxes} boxes lie outside of the image of {width} × {height} pixels and are left out: \
+                 compare `source.camera.width` and `source.camera.height` with the images of the detector"
+            ),
+            Self::NormalizedBoxes { boxes, image: [width, height] } => write!(
+                f,
+                "all {boxes} boxes lie between 0 and 1, where pixels are expected: multiply x by the width, {width}, \
+                 and y by the height, {height}"
+            ),
             Self::NotMapped { what, remedy } => write!(f, "not mapped: {what}; {remedy}"),
             Self::NoObjects { detected: 0 } => f.write_str(
                 "no box says which object it shows; `association = { type = \"likelihood\" }` finds out",

@@ -108,7 +108,7 @@ impl<'a> RuleEvaluator<'a> {
                 verdict.left_out.push(SkippedRule { factor, rule: i + 1, because });
                 continue;
             }
-            if self.up.is_none() && rule.near.as_ref().is_some_and(|near| near.below) {
+            if self.up.is_none() && rule.needs_up() {
                 return Err(RuleError::NoUp { factor });
             }
             match self.keys(i, rule, object) {

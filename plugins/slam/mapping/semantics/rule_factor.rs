@@ -31,8 +31,8 @@ pub struct RuleFactor {
 pub enum RuleError {
     /// The factor needs the up direction, which is unknown.
     #[error(
-        "the semantic factor `{factor}` needs to know which way is up, and the data source does not say: \
-         set `[gravity]`, for example gravity = {{ type = \"vector\", up = [0.0, 0.0, 1.0] }}"
+        "a semantic rule with the factor `{factor}` needs the up direction of the map, which is unknown: set \
+         `[gravity]`"
     )]
     NoUp {
         /// Type of the factor.

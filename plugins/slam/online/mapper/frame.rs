@@ -302,7 +302,7 @@ impl Mapper {
 
     /// Checks that no semantic rule lacks the up direction.
     fn check_rules(&self, up: Option<Direction>) -> Result<(), RuleError> {
-        let waiting = self.settings.semantics.iter().find(|rule| up.is_none() && rule.factor.wants_up());
+        let waiting = self.settings.semantics.iter().find(|rule| up.is_none() && rule.needs_up());
         match waiting {
             Some(rule) => Err(RuleError::NoUp { factor: rule.factor.factor_type().to_owned() }),
             None => Ok(()),

@@ -1,7 +1,7 @@
 use super::assemble::read_ground_truth;
 use super::rectification::Rectification;
 use super::stream::FrameStream;
-use super::{CameraChoice, InputFolders, SequenceSource, SourceError};
+use super::{CameraChoice, InputFolders, SequenceSource, SourceError, check_files};
 use crate::measurement::Quantities;
 use crate::sequence::{
     Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Sequence, SequenceHeader,
@@ -226,6 +226,14 @@ const MAX_UNREADABLE_LINES: usize = 1000;
 impl SequenceSource for JsonLines {
     fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
         self.open_lines(folders)?.collect()
+    }
+
+    fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
+        check_files(&folders.document, &[self.file.as_deref(), self.ground_truth.as_deref()])
+    }
+
+    fn may_have_up(&self) -> bool {
+        self.up.is_some()
     }
 
     fn open(&self, folders: &InputFolders) -> Result<Option<FrameStream>, SourceError> {

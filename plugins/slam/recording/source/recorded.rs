@@ -3,7 +3,7 @@ use super::assemble::{
 };
 use super::camera::CameraChoice;
 use super::rectification::{Distortion, Rectification};
-use super::{InputFolders, SequenceSource, SourceError};
+use super::{InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::Sequence;
 use manifactor_graph::checked::{NotNegative, Share};
 use manifactor_graph::{Direction, register};
@@ -71,7 +71,7 @@ fn exact() -> NotNegative {
 #[typetag::serialize(name = "recorded")]
 impl SequenceSource for RecordedFiles {
     fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
-        let folder = folders.data_set(&self.folder)?;
+        let folder = folders.data_set(&self.folder, "source.folder")?;
         let lens = Rectification::new(&self.camera, self.distortion)?;
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
         let by = TimeMatching { within: self.max_time_difference, without_pose: self.max_without_pose };
@@ -91,6 +91,21 @@ impl SequenceSource for RecordedFiles {
             ground_truth: truth,
             unused,
         })
+    }
+
+    fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
+        let folder = folders.data_set(&self.folder, "source.folder")?;
+        let files = &[
+            Some(self.odometry.as_path()),
+            Some(self.detections.as_path()),
+            self.ground_truth.as_deref(),
+            self.objects.as_deref(),
+        ];
+        check_files(&folder, files)
+    }
+
+    fn may_have_up(&self) -> bool {
+        self.up.is_some()
     }
 }
 register!(dyn SequenceSource, "recorded", RecordedFiles);

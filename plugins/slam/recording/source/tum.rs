@@ -1,7 +1,7 @@
 use super::assemble::{TimeMatching, default_share, is_default_share, read_ground_truth, read_matched};
 use super::camera::{CameraChoice, by_folder};
 use super::rectification::{Distortion, Rectification};
-use super::{InputFolders, SequenceSource, SourceError};
+use super::{InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
 use manifactor_graph::checked::{NotNegative, Share};
@@ -60,7 +60,7 @@ fn exact() -> NotNegative {
 #[typetag::serialize(name = "tum")]
 impl SequenceSource for TumRgbd {
     fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
-        let folder = folders.data_set(&self.sequence)?;
+        let folder = folders.data_set(&self.sequence, "source.sequence")?;
         let lens = match &self.camera {
             Some(choice) => Rectification::new(choice, self.distortion)?,
             None => Rectification::of_pinhole(by_folder(&folder)?, self.distortion),
@@ -85,6 +85,17 @@ impl SequenceSource for TumRgbd {
             ground_truth: truth,
             unused,
         })
+    }
+
+    fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
+        let folder = folders.data_set(&self.sequence, "source.sequence")?;
+        let files =
+            &[Some(self.odometry.as_path()), Some(self.detections.as_path()), self.ground_truth.as_deref()];
+        check_files(&folder, files)
+    }
+
+    fn may_have_up(&self) -> bool {
+        false
     }
 }
 register!(dyn SequenceSource, "tum", TumRgbd);

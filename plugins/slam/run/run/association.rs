@@ -33,6 +33,7 @@ pub(super) fn associate_sequence(
     let mut mapper = Mapper::new(sequence.header(), settings);
     let (mut named, mut history) = (Sequence::clone(&sequence), AssociationHistory::default());
     let mut taken = vec![];
+    let (mut rejections, mut first_rejection) = (0, None);
     let mut interrupted = false;
     for observation in sequence.observations() {
         interrupted |= observer.poll().is_break();
@@ -48,11 +49,21 @@ pub(super) fn associate_sequence(
                 taken.push(Some(report.frame));
             }
             Err(error) => {
-                tracing::warn!("{error}");
+                rejections += 1;
+                first_rejection.get_or_insert(error);
                 history.record_frame(&observation.detections, None);
                 taken.push(None);
             }
         }
+    }
+    match first_rejection {
+        Some(error) if taken.iter().all(Option::is_none) && !interrupted => {
+            return Err(RunError::NoFrameMapped(error));
+        }
+        Some(error) => {
+            tracing::warn!("association rejects {rejections} of {} frames, the first: {error}", taken.len());
+        }
+        None => {}
     }
     mapper.finish_association().refused.iter().for_each(|refused| tracing::warn!("{refused}"));
     for ((observation, boxes), frame) in with_boxes(&sequence).zip(&taken) {
