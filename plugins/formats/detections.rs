@@ -121,7 +121,7 @@ pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<DetectionRow>, Fo
     let missing: Vec<_> = REQUIRED.into_iter().filter(|name| header.iter().all(|h| h != *name)).collect();
     if !missing.is_empty() {
         let line = header.position().map_or(1, |p| p.line() as usize);
-        problems.push(line, Mistake::Row(format!("the header has no column {}", missing.join(", "))));
+        problems.push(line, Mistake::Row(missing_columns(&missing, &header)));
         return problems.finish().map(|()| vec![]);
     }
     let mut rows = vec![];
@@ -138,6 +138,31 @@ pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<DetectionRow>, Fo
         }
     }
     problems.finish().map(|()| rows)
+}
+
+/// Other names of required columns, in common exports of detectors.
+const OTHER_NAMES: &[(&str, &[&str])] = &[
+    ("timestamp", &["time", "stamp", "t"]),
+    ("class_name", &["class", "label", "name", "category"]),
+    ("score", &["confidence", "conf", "probability"]),
+    ("xmin", &["x1", "left"]),
+    ("ymin", &["y1", "top"]),
+    ("xmax", &["x2", "right"]),
+    ("ymax", &["y2", "bottom"]),
+];
+
+/// Names the missing columns, each with the column of the header that has probably the same meaning.
+fn missing_columns(missing: &[&str], header: &StringRecord) -> String {
+    let likely = |name: &str| {
+        let others =
+            OTHER_NAMES.iter().find(|(column, _)| *column == name).map_or(&[][..], |(_, others)| others);
+        let plain = |h: &str| h.to_ascii_lowercase().replace(['_', '-', ' '], "");
+        let found = header.iter().find(|h| plain(h) == plain(name) || others.contains(&plain(h).as_str()))?;
+        Some(format!("rename `{found}` to `{name}`"))
+    };
+    let renamed: Vec<String> = missing.iter().filter_map(|name| likely(name)).collect();
+    let message = format!("the header has no column {}", missing.join(", "));
+    if renamed.is_empty() { message } else { format!("{message}: {}", renamed.join(", ")) }
 }
 
 fn row(record: &StringRecord, header: &StringRecord) -> Result<DetectionRow, Mistake> {
@@ -218,6 +243,10 @@ mod tests {
         let text = parse("timestamp,score,xmin,ymin,xmax,ymax\n", "d.csv").unwrap_err().to_string();
         assert_eq!(text, "d.csv:1: the header has no column class_name");
         assert!(parse("", "d.csv").is_err());
+        let text = parse("time,class,Score,x1,ymin,xmax,ymax\n", "d.csv").unwrap_err().to_string();
+        let expected = "rename `time` to `timestamp`, rename `class` to `class_name`, rename `Score` to `score`, \
+                        rename `x1` to `xmin`";
+        assert!(text.ends_with(expected), "{text}");
     }
 
     #[test]

@@ -174,6 +174,12 @@ pub enum Mistake {
         /// Unknown tags found in the file.
         unknown: Vec<String>,
     },
+    /// The columns of a trajectory are separated by commas.
+    #[error(
+        "expected fields separated by spaces (timestamp tx ty tz qx qy qz qw), found commas: replace the commas by spaces; \
+         a file in EuRoC's format also has timestamps in nanoseconds and qw before qx, so that both have to be converted"
+    )]
+    Commas,
     /// A row of a table cannot be read.
     #[error("{0}")]
     Row(String),

@@ -36,7 +36,7 @@ pub struct Trajectory {
 /// Reads a trajectory.
 ///
 /// # Errors
-/// If a line has missing, extra or non-finite fields, a quaternion whose length differs from 1 by more than
+/// If the columns are separated by commas. If a line has missing, extra or non-finite fields, a quaternion whose length differs from 1 by more than
 /// 0.001, or a timestamp more than 0.05 s before the previous one; the error lists all such lines. If the
 /// file has no pose.
 pub fn read(path: impl AsRef<Path>) -> Result<Trajectory, FormatError> {
@@ -52,6 +52,11 @@ pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Trajectory, FormatErr
     let mut problems = ProblemList::of(path.as_ref(), text);
     let mut trajectory = Trajectory::default();
     let mut empty = true;
+    if let Some((line, _)) = lines(text).next().filter(|(_, first)| first.contains(',')) {
+        // one error for the whole file instead of one per line
+        problems.push(line, Mistake::Commas);
+        return problems.finish().map(|()| trajectory);
+    }
     for (line, text) in lines(text) {
         empty = false;
         let added = stamped_pose(text).and_then(|pose| trajectory.add(line, pose));
@@ -142,6 +147,14 @@ mod tests {
              t.txt:5: expected a unit quaternion (x, y, z, w), got [0.0, 0.0, 1.0, 1.0] of length \
              1.4142135623730951; its length has to be 1 to within 0.001"
         );
+    }
+
+    #[test]
+    fn commas_are_one_error() {
+        let text = "#timestamp,tx,ty,tz,qx,qy,qz,qw\n1,0,0,0,0,0,0,1\n2,0,0,0,0,0,0,1\n";
+        let found = errors(text);
+        assert!(found.starts_with("t.txt:2: ") && found.lines().count() == 1, "{found}");
+        assert!(found.contains("replace the commas"), "{found}");
     }
 
     #[test]

@@ -44,6 +44,11 @@ fn detections_of_objects() {
         text("no header", "0,cup,0.9,10,10,50,50,1\n"),
         text("a column missing", "timestamp,class_name,score,xmin,ymin,xmax\n0,cup,0.9,10,10,50\n"),
         text(
+            "columns with other names",
+            "time,class,confidence,xmin,ymin,xmax,ymax\n0,cup,0.9,10,10,50,50\n",
+        ),
+        text("nanoseconds", format!("{HEADER}1700000000000000000,cup,0.9,10,10,50,50,1\n")),
+        text(
             "a column twice",
             "timestamp,timestamp,class_name,score,xmin,ymin,xmax,ymax\n0,0,cup,0.9,10,10,50,50\n",
         ),

@@ -225,9 +225,17 @@ pub enum SourceError {
     Simulation(String),
 }
 
+/// Distance above which two files hardly use the same unit: 300 years.
+const OTHER_UNIT_S: f64 = 1e10;
+
 fn closest(nearest: Option<(f64, f64)>) -> String {
-    let told = |(at, away)| format!(" (the closest, at {at} s, is {away:.6} s away)");
-    nearest.map(told).unwrap_or_default()
+    let Some((at, away)) = nearest else { return String::new() };
+    let unit = if away > OTHER_UNIT_S {
+        "; timestamps are in seconds: is one of the files in nanoseconds?"
+    } else {
+        ""
+    };
+    format!(" (the closest, at {at} s, is {away:.6} s away{unit})")
 }
 
 fn paths(tried: &[PathBuf]) -> String {
