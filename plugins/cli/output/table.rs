@@ -166,13 +166,14 @@ fn held_out(variant: &VariantReport) -> String {
         format!("{:.digits$}{error}", mean.mean)
     };
     let line = format!(
-        "{}: {} held-out boxes of {}: IoU {}, error {} px; {out_of_view} predicted out of view, {} of objects not in the map",
+        "{}: {} held-out boxes of {}: IoU {}, error {} px; {out_of_view} predicted out of view; IoU {} with {} of objects not in the map, which count as 0",
         on_one_line(&variant.name),
         boxes,
         text::count(objects, "object"),
         of(iou, 3),
         of(pixels, 1),
-        held_out.unmapped
+        of(held_out.iou_unmapped_as_zero, 3),
+        text::count(held_out.unmapped, "box"),
     );
     text::wrap(&line) + "\n"
 }

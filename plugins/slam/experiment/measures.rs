@@ -27,7 +27,7 @@ const ALIGNMENT_MEASURES: [TrajectoryMeasure; 9] = [
 ];
 
 /// Measures that do not depend on an alignment.
-const ESTIMATE_MEASURES: [EstimateMeasure; 32] = [
+const ESTIMATE_MEASURES: [EstimateMeasure; 34] = [
     ("position", |_, r| Some(r.landmarks?.estimate.rmse.position)),
     ("position_mean", |_, r| Some(r.landmarks?.estimate.mean.position)),
     ("shape", |_, r| Some(r.landmarks?.estimate.mean.shape)),
@@ -45,6 +45,7 @@ const ESTIMATE_MEASURES: [EstimateMeasure; 32] = [
     ("sigma_translation", |e, _| Some(e.components.last()?.odometry?.noise.translation)),
     ("held_out_iou", |_, r| Some(r.held_out.as_ref()?.all.iou.mean)),
     ("held_out_iou_error", |_, r| r.held_out.as_ref()?.all.iou.error),
+    ("held_out_iou_unmapped_as_zero", |_, r| Some(r.held_out.as_ref()?.iou_unmapped_as_zero.mean)),
     ("held_out_px", |_, r| Some(r.held_out.as_ref()?.all.pixels.mean)),
     ("pivot", |e, _| Some(e.components.last()?.odometry?.noise.pivot)),
     ("validation", |e, _| Some(e.components.last()?.odometry?.score.cost)),
@@ -56,6 +57,7 @@ const ESTIMATE_MEASURES: [EstimateMeasure; 32] = [
     ("variance_rounds", |e, _| e.components.last().map(|_| e.components.len() as f64)),
     ("objects_detected", |_, r| Some(r.counts.objects_detected as f64)),
     ("objects", |_, r| Some(r.counts.objects as f64)),
+    ("completeness", |_, r| Some(r.counts.objects as f64 / r.counts.objects_detected as f64)),
     ("boxes", |_, r| Some(r.counts.boxes as f64)),
     ("semantic_factors", |_, r| Some(r.counts.semantic_factors as f64)),
     ("unsound", |e, _| Some(count_unsound_objects(e) as f64)),
@@ -73,6 +75,9 @@ const ESTIMATE_MEASURES: [EstimateMeasure; 32] = [
 ///   ends of its 95 % confidence interval, over blocks of ten seconds.
 /// - `position` is an RMSE, `position_mean` a mean.
 /// - `shape` and `quality` are mean Jaccard distances.
+/// - `held_out_iou` is the mean over held-out boxes of mapped objects; in `held_out_iou_unmapped_as_zero`, boxes
+///   of objects that are not in the map count as 0.
+/// - `completeness` is the number of objects in the map as a share of the detected ones.
 /// - `initial_*` are measures of the objects before the solve.
 /// - `nees_*` are normalized errors squared per degree of freedom, 1 if covariances are right.
 /// - `c_vertical` is the mean of |m · up| over objects that are vertical by the paper's Table I, with their

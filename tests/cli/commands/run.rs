@@ -41,6 +41,24 @@ fn a_run_leaves_its_files() {
 }
 
 #[test]
+fn held_out_boxes_of_objects_that_are_not_mapped_count_as_zero() {
+    let folder = folder(&[]);
+    let out = path(&folder, "desk");
+    // the box limit keeps some of the objects out of the map
+    let ran = manifactor(&format!(
+        "run examples/desk/desk.toml --out {out} --set evaluation.holdout.first=0.3 --set objects.max_box_deviation_px=4 --json"
+    ));
+    let report = ran.json();
+    let held_out = &report["variants"][0]["held_out"];
+    let (mapped, unmapped) =
+        (held_out["all"]["boxes"].as_f64().unwrap(), held_out["unmapped"].as_f64().unwrap());
+    assert!(mapped > 0.0 && unmapped > 0.0, "{held_out}");
+    let of_all = held_out["iou_unmapped_as_zero"]["mean"].as_f64().unwrap();
+    let of_mapped = held_out["all"]["iou"]["mean"].as_f64().unwrap();
+    assert!((of_all - of_mapped * mapped / (mapped + unmapped)).abs() < 1e-9, "{held_out}");
+}
+
+#[test]
 fn the_condition_the_largest_cost_and_the_noise_are_printed_on_request() {
     let folder = folder(&[]);
     let out = path(&folder, "desk");

@@ -17,8 +17,9 @@ pub struct EvaluationSettings {
     /// Number of frames that relative errors span.
     pub relative_over: NonZeroUsize,
     /// Boxes that `manifactor run` withholds from the estimate and then predicts: `{ share = 0.2 }` of all
-    /// boxes at random, all boxes of the `{ last = 0.2 }` of the frames at the end, or the last
-    /// `{ block = 30 }` frames of every 150. Default: none.
+    /// boxes at random, all boxes of an object except its `{ first = 0.05 }`, all boxes of the
+    /// `{ last = 0.2 }` of the frames at the end, or the last `{ block = 30 }` frames of every 150. Default:
+    /// none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub holdout: Option<Holdout>,
 }

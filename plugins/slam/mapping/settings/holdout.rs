@@ -1,9 +1,10 @@
 use manifactor_graph::checked::Share;
-use manifactor_recording::sequence::{Detection, Sequence};
+use manifactor_recording::sequence::{Detection, ObjectId, Sequence};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 
 /// Boxes that the estimate does not use and then predicts. The prediction error measures the quality of a map
@@ -13,6 +14,9 @@ use std::num::NonZeroUsize;
 pub enum Holdout {
     /// This share of all boxes, drawn at random. The remaining boxes of the same frames are used.
     Share(Share),
+    /// All boxes of an object except its first ones, the used share. Measures maps of objects seen from few
+    /// views. Boxes without an object are used.
+    First(Share),
     /// All boxes of the last frames, this share of all frames.
     Last(Share),
     /// The boxes of the last `n` of every 5`n` frames. Choose `n` longer than a detector's errors last.
@@ -29,8 +33,17 @@ impl Holdout {
     pub fn take_from(self, sequence: &mut Sequence) -> Vec<Detection> {
         let mut rng = Pcg64::seed_from_u64(SEED);
         let frames = sequence.frames.len();
+        let mut remaining = self.first_boxes(&sequence.detections);
         let mut is_held_out = |detection: &Detection| match self {
             Self::Share(share) => rng.random_bool(*share),
+            Self::First(_) => match detection.object.and_then(|object| remaining.get_mut(&object)) {
+                Some(0) => true,
+                Some(left) => {
+                    *left -= 1;
+                    false
+                }
+                None => false,
+            },
             Self::Last(share) => detection.frame as f64 >= (1.0 - *share) * frames as f64,
             Self::Block(length) => {
                 detection.frame / length.get() % BLOCKS_PER_HOLDOUT == BLOCKS_PER_HOLDOUT - 1
@@ -40,6 +53,18 @@ impl Holdout {
         let (held_out, used) = all.into_iter().partition(|detection| is_held_out(detection));
         sequence.detections = used;
         held_out
+    }
+
+    /// Returns the number of used boxes of each object for [`First`](Self::First), rounded up.
+    fn first_boxes(self, detections: &[Detection]) -> BTreeMap<ObjectId, usize> {
+        let mut boxes: BTreeMap<ObjectId, usize> = BTreeMap::new();
+        if let Self::First(share) = self {
+            for object in detections.iter().filter_map(|detection| detection.object) {
+                *boxes.entry(object).or_default() += 1;
+            }
+            boxes.values_mut().for_each(|n| *n = (*share * *n as f64).ceil() as usize);
+        }
+        boxes
     }
 }
 
@@ -70,6 +95,10 @@ mod tests {
             held_out.iter().all(|d| 5 * d.frame >= 4 * frames)
                 && rest.iter().all(|d| 5 * d.frame < 4 * frames)
         );
+        let (held_out, rest) = split(Holdout::First(Share::literal(0.1)));
+        let last_used = |object| rest.iter().filter(|d| d.object == object).map(|d| d.frame).max().unwrap();
+        assert!(held_out.iter().all(|d| d.frame > last_used(d.object)));
+        assert!((rest.len() as f64 / boxes as f64 - 0.1).abs() < 0.03);
         let length = NonZeroUsize::new(3).unwrap();
         let (held_out, rest) = split(Holdout::Block(length));
         assert!(!held_out.is_empty() && held_out.iter().all(|d| d.frame % 15 >= 12));

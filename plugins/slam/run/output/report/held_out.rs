@@ -16,6 +16,9 @@ pub struct HeldOutReport {
     pub holdout: Holdout,
     /// Number of boxes of objects that are not in the map.
     pub unmapped: usize,
+    /// Mean intersection over union if boxes of objects that are not in the map count as 0. A map cannot
+    /// improve it by leaving out difficult objects.
+    pub iou_unmapped_as_zero: ClusteredMean,
     /// Result of all predicted boxes.
     pub all: Prediction,
     /// Results by class.
@@ -58,7 +61,7 @@ struct PredictedBox {
 impl HeldOutReport {
     pub(crate) fn new(estimate: &Estimate, held_out: &[Detection], settings: &RunSettings) -> Option<Self> {
         let holdout = settings.evaluation.holdout?;
-        let (mut unmapped, mut all) = (0, vec![]);
+        let (mut unmapped, mut all) = (vec![], vec![]);
         let mut classes: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for detection in held_out {
             let FilteredDetection::View(view) =
@@ -73,12 +76,18 @@ impl HeldOutReport {
                     classes.entry(class.unwrap_or("unknown").to_owned()).or_default().push(all.len());
                     all.push(predicted);
                 }
-                None => unmapped += 1,
+                None => unmapped.push(PredictedBox { object, iou: 0.0, pixels: None }),
             }
         }
         let of_class = |places: Vec<usize>| Prediction::of(places.iter().filter_map(|i| all.get(*i)));
         let classes = classes.into_iter().map(|(class, places)| (class, of_class(places))).collect();
-        Some(Self { holdout, unmapped, all: Prediction::of(all.iter()), classes })
+        Some(Self {
+            holdout,
+            unmapped: unmapped.len(),
+            iou_unmapped_as_zero: Prediction::of(all.iter().chain(&unmapped)).iou,
+            all: Prediction::of(all.iter()),
+            classes,
+        })
     }
 }
 
