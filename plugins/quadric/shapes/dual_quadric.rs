@@ -86,6 +86,12 @@ impl DualQuadric {
         let half = Vector3::from_fn(|i, _| axes.row(i).norm());
         Box3 { min: self.centroid() - half, max: self.centroid() + half }
     }
+    /// Returns whether the shortest semi-axis is below 1/50 of the longest. Boxes from one side leave the
+    /// thickness of an object undetermined, and an estimate without a prior then collapses to a plate.
+    pub fn is_flat(&self) -> bool {
+        const MAX_AXIS_RATIO: f64 = 50.0;
+        self.semi_axes.max() > MAX_AXIS_RATIO * self.semi_axes.min()
+    }
     /// Returns whether the whole ellipsoid is in front of a camera, see
     /// [`Ellipsoid::is_in_front`](crate::Ellipsoid::is_in_front).
     #[inline]
@@ -222,6 +228,12 @@ mod tests {
         }
         let nan = tilted(0.3).retract(&SVector::repeat(f64::NAN));
         assert!(!nan.is_finite());
+    }
+
+    #[test]
+    fn a_flat_ellipsoid_has_one_axis_below_a_fiftieth_of_the_longest() {
+        let with = |thin: f64| DualQuadric { semi_axes: Vector3::new(thin, 0.5, 1.0), ..tilted(0.3) };
+        assert!(with(0.019).is_flat() && !with(0.021).is_flat());
     }
 
     #[test]

@@ -50,6 +50,10 @@ pub struct PriorObject {
     /// earlier programs.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "least_px")]
     pub least_px: Option<f64>,
+    /// True if the shortest semi-axis is below 1/50 of the longest: the object was seen from one side, or is
+    /// thin.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub flat: bool,
 }
 
 /// Number of opportunities to detect an object, and number of those with a detection. An opportunity groups

@@ -84,3 +84,28 @@ fn a_map_that_cannot_be_read_is_told_before_anything_is_done() {
     run("--set prior_map.start.translation=[0,0,0]").complains("file");
     assert!(!std::path::Path::new(&out).exists());
 }
+
+#[test]
+fn flat_objects_have_a_warning_and_a_flag() {
+    let rule = "[[semantics]]\nclasses = ['*']\nnoise = { sigma = 0.001 }\n\
+                factor = { type = 'shape_prior', semi_axes = [1.0, 1.0, 0.01] }\n";
+    let flat = DESK.replace("semantics = \"table_one\"", "") + rule;
+    let folder = folder(&[("flat.toml", &flat), ("desk.toml", DESK)]);
+    let flags = |name: &str| {
+        let out = path(&folder, name);
+        let ran = manifactor(&format!("run {} --out {out}", path(&folder, &format!("{name}.toml"))));
+        let read = |file: &str| {
+            let text = std::fs::read_to_string(format!("{out}/estimate/{file}")).unwrap();
+            serde_json::from_str::<Value>(&text).unwrap()
+        };
+        let flat = |objects: &Value| {
+            objects.as_array().unwrap().iter().filter(|object| object["flat"] == true).count()
+        };
+        let counts = [flat(&read("map.json")["objects"]), flat(&read("objects.json"))];
+        assert_eq!(counts[0], counts[1]);
+        assert_eq!(counts[0] > 0, (ran.stdout + &ran.stderr).contains("flat, seen from one side: q"));
+        counts[0]
+    };
+    assert!(flags("flat") > 0);
+    assert_eq!(flags("desk"), 0);
+}

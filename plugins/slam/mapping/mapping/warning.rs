@@ -62,6 +62,12 @@ pub enum Warning {
         /// Keys and semi-axes of the objects.
         objects: Vec<String>,
     },
+    /// Objects with a semi-axis far shorter than the others, see
+    /// [`is_flat`](manifactor_quadric::DualQuadric::is_flat).
+    Flat {
+        /// Keys and semi-axes of the objects.
+        objects: Vec<String>,
+    },
     /// The map has no objects.
     NoObjects {
         /// Number of detected objects.
@@ -165,6 +171,11 @@ impl fmt::Display for Warning {
                 f,
                 "boxes do not limit the shape of {}: {}; the factor `shape_prior` keeps the semi-axes of an object alike",
                 if objects.len() == 1 { "an object" } else { "objects" },
+                objects.join(", ")
+            ),
+            Self::Flat { objects } => write!(
+                f,
+                "flat, seen from one side: {}; boxes hardly determine their thickness, which the factor `shape_prior` does",
                 objects.join(", ")
             ),
             Self::NotRobust => f.write_str(

@@ -65,6 +65,7 @@ pub fn map_of(estimate: &Estimate, settings: &RunSettings) -> Result<PriorMap, M
             covariance: covariances.remove(object.key.as_str())?,
             detection_counts,
             least_px: measured.least_px(),
+            flat: quadric.is_flat(),
         }))
     };
     let objects = estimate.landmarks().into_iter().filter_map(object).collect();

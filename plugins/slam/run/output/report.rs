@@ -163,6 +163,9 @@ pub struct ObjectReport {
     /// Estimate in the map frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimate: Option<DualQuadric>,
+    /// True if the shortest semi-axis is below 1/50 of the longest.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub flat: bool,
     /// Error of the estimate, if the truth is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<LandmarkError>,
@@ -180,7 +183,7 @@ impl VariantReport {
         let after = landmarks::in_truth_frame(estimate, estimate.landmarks());
         let before = landmarks::in_truth_frame(estimate, estimate.initial_landmarks());
         let objects = objects(estimate, &after);
-        warnings.extend(super::shapes::run_away_warning(estimate));
+        warnings.extend(super::shapes::shape_warnings(estimate));
         let landmarks = LandmarkReport::new(&before, &after);
         Self {
             name: name.to_owned(),
@@ -283,6 +286,7 @@ fn objects(estimate: &Estimate, errors: &[(LandmarkEstimate<'_>, LandmarkError)]
         object: object.clone(),
         rejected_because: object.rejected.as_ref().map(Rejection::to_string),
         estimate: values.get::<DualQuadric>(&object.key).ok().copied(),
+        flat: values.get::<DualQuadric>(&object.key).is_ok_and(DualQuadric::is_flat),
         error: errors.iter().find(|(landmark, _)| landmark.object.id == object.id).map(|(_, e)| *e),
     };
     estimate.mapping.objects.iter().map(report).collect()

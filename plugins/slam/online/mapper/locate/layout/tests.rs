@@ -20,6 +20,7 @@ fn object(id: u32, class: &str, centre: Vector3<f64>) -> Arc<PriorObject> {
         covariance,
         detection_counts: DetectionCounts::default(),
         least_px: None,
+        flat: false,
     })
 }
 
