@@ -8,7 +8,7 @@ use nalgebra::{Matrix3x4, Matrix4, Vector3, Vector4};
 /// Length of the windows in seconds. Odometry counts as exact within a window.
 const WINDOW_S: f64 = 2.0;
 /// Largest allowed value of twice the log-likelihood ratio of moving to standing still. In simulation, it
-/// rejects an object at rest in 2 of 200 trials (`docs/decisions/association.md`).
+/// rejects an object at rest in 2 of 200 trials (`docs/decisions/moving-objects.md`).
 const MAX_EVIDENCE: f64 = 9.0;
 /// Largest allowed root mean square scatter of the positions within a window, in standard deviations.
 const MAX_SCATTER: f64 = 2.0;

@@ -68,6 +68,13 @@ pub enum Warning {
         /// Keys and semi-axes of the objects.
         objects: Vec<String>,
     },
+    /// The estimated noise of the odometry is the largest that is tried.
+    NoiseAtLimit {
+        /// Standard deviation of the rotation. Unit: radians.
+        rotation: f64,
+        /// Standard deviation of the translation. Unit: metres.
+        translation: f64,
+    },
     /// The map has no objects.
     NoObjects {
         /// Number of detected objects.
@@ -177,6 +184,12 @@ impl fmt::Display for Warning {
                 f,
                 "flat, seen from one side: {}; boxes hardly determine their thickness, which the factor `shape_prior` does",
                 objects.join(", ")
+            ),
+            Self::NoiseAtLimit { rotation, translation } => write!(
+                f,
+                "the estimated noise of the odometry, {rotation} rad and {translation} m, is the largest that is tried, as \
+                 after a jump of the odometry; a robust `odometry.loss` reduces the weight of jumps, for example \
+                 {{ type = \"geman_mcclure\", scale = 5.0 }}"
             ),
             Self::NotRobust => f.write_str(
                 "boxes without names are put to wrong objects now and then, and count in full; \

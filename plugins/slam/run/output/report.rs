@@ -1,7 +1,7 @@
 //! Report of a run, for scripts and for people.
 use crate::output::map::gone_objects;
 use manifactor_graph::Direction;
-use manifactor_mapping::estimate::variance::VarianceComponents;
+use manifactor_mapping::estimate::variance::{MotionChoice, VarianceComponents};
 use manifactor_mapping::estimate::{Estimate, LandmarkEstimate};
 use manifactor_mapping::mapping::{MappedObject, Rejection, Warning};
 use manifactor_mapping::settings::RunSettings;
@@ -184,6 +184,11 @@ impl VariantReport {
         let before = landmarks::in_truth_frame(estimate, estimate.initial_landmarks());
         let objects = objects(estimate, &after);
         warnings.extend(super::shapes::shape_warnings(estimate));
+        let noise = estimate.components.last().and_then(|found| found.odometry);
+        warnings.extend(noise.filter(MotionChoice::is_at_limit).map(|found| Warning::NoiseAtLimit {
+            rotation: found.noise.rotation,
+            translation: found.noise.translation,
+        }));
         let landmarks = LandmarkReport::new(&before, &after);
         Self {
             name: name.to_owned(),

@@ -78,6 +78,11 @@ impl MotionChoice {
     pub fn keeps_input(&self) -> bool {
         !self.score.is_better()
     }
+
+    /// Returns whether a standard deviation is the largest of the search, so that the best one may be larger.
+    pub fn is_at_limit(&self) -> bool {
+        !self.keeps_input() && self.place.0.max(self.place.1) == GRID_LIMITS[1]
+    }
 }
 
 /// A point of the search grid: both standard deviations in half decades relative to 1e-3, and whether there
@@ -185,6 +190,18 @@ pub(super) fn choose_noise(
 mod tests {
     use super::*;
     use nalgebra::DVector;
+
+    #[test]
+    fn the_largest_noise_of_the_search_is_at_its_limit() {
+        let choice = |turn, cost| MotionChoice {
+            score: CrossValidationScore { cost, deviation: 1.0 },
+            place: (turn, 0, false),
+            ..MotionChoice::initial()
+        };
+        assert!(choice(GRID_LIMITS[1], -9.0).is_at_limit());
+        assert!(!choice(GRID_LIMITS[1] - 1, -9.0).is_at_limit());
+        assert!(!choice(GRID_LIMITS[1], 9.0).is_at_limit(), "the odometry is kept");
+    }
 
     #[test]
     fn turning_about_the_pivot_moves_what_is_there_by_nothing() {

@@ -99,7 +99,7 @@ const MIN_LEAD_NATS: f64 = 12.0;
 /// Weight of the up direction relative to all marks together.
 const UP_WEIGHT: f64 = 10.0;
 /// Standard deviation of the tilt, in radians. With equal σ in all directions, the trajectory tilted by up to
-/// 13° on fr1 (`docs/decisions/prior-maps.md`).
+/// 13° on fr1.
 const TILT_SIGMA_RAD: f64 = 0.01;
 /// Relative spread of the marks below which a direction is undetermined.
 const MIN_RELATIVE_SPREAD: f64 = 1e-3;
