@@ -36,9 +36,9 @@ pub struct Trajectory {
 /// Reads a trajectory.
 ///
 /// # Errors
-/// If the columns are separated by commas. If a line has missing, extra or non-finite fields, a quaternion whose length differs from 1 by more than
-/// 0.001, or a timestamp more than 0.05 s before the previous one; the error lists all such lines. If the
-/// file has no pose.
+/// If the columns are separated by commas. If a line has missing, extra or non-finite fields, a quaternion
+/// whose length differs from 1 by more than 0.001, or a timestamp more than 0.05 s before the previous one;
+/// the error lists all such lines. If the file has no pose.
 pub fn read(path: impl AsRef<Path>) -> Result<Trajectory, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path)

@@ -83,3 +83,12 @@ fn only_the_first_searched_folders_are_listed() {
 fn an_override_that_fits_nothing_is_shown() {
     manifactor("check examples/desk/desk.toml --set source.scene.objets=3").ended(2).complains("objects");
 }
+
+#[test]
+fn an_association_that_rejects_every_frame_is_an_error() {
+    let run = "association = { type = 'likelihood' }\ngravity = { type = 'accelerometer' }\n\
+               source = { type = 'simulated', scene = { objects = 4 }, trajectory = { frames = 20 } }\n";
+    let folder = folder(&[("run.toml", run)]);
+    let (run, out) = (path(&folder, "run.toml"), path(&folder, "out"));
+    manifactor(&format!("run {run} --out {out}")).ended(2).complains("no frame can be mapped");
+}

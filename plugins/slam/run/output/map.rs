@@ -56,7 +56,10 @@ pub fn map_of(estimate: &Estimate, settings: &RunSettings) -> Result<PriorMap, M
             .plus(opportunities.all);
         if let Some(prior) = measured.prior.as_ref().filter(|_| measured.views.is_empty()) {
             let classes = measured.classes().clone();
-            return Some(Arc::new(PriorObject { classes, detection_counts, ..PriorObject::clone(prior) }));
+            // maps of earlier programs have no such flag
+            let flat = prior.quadric.is_flat();
+            let kept = PriorObject { classes, detection_counts, flat, ..PriorObject::clone(prior) };
+            return Some(Arc::new(kept));
         }
         Some(Arc::new(PriorObject {
             id: object.id,
