@@ -12,7 +12,7 @@ pub use factors::{
 };
 pub use manifactor_geometry::{Camera, CameraError};
 pub use shapes::{
-    AxisOrder, BoundingBox, BoundingBoxError, Box3, Box3Error, DualConic, DualQuadric, Ellipse, Ellipsoid,
-    EllipsoidError, LandmarkError, MAX_SEMI_AXIS, MIN_SEMI_AXIS, OnHyperboloid, SIDES, SemiAxes,
+    AxisOrder, BoundingBox, BoundingBoxError, Box3, Box3Error, Cuboid, DualConic, DualQuadric, Ellipse,
+    Ellipsoid, EllipsoidError, LandmarkError, MAX_SEMI_AXIS, MIN_SEMI_AXIS, OnHyperboloid, SIDES, SemiAxes,
     SemiAxesError,
 };

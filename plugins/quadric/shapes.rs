@@ -20,7 +20,7 @@ pub use dual_quadric::DualQuadric;
 pub use ellipse::Ellipse;
 pub use ellipsoid::Ellipsoid;
 pub use from_matrix::{EllipsoidError, OnHyperboloid};
-pub use landmark::LandmarkError;
+pub use landmark::{Cuboid, LandmarkError};
 pub use semi_axes::{MAX_SEMI_AXIS, MIN_SEMI_AXIS, SemiAxes, SemiAxesError};
 
 pub(crate) use dual_quadric::move_and_scale;

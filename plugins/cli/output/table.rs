@@ -8,8 +8,19 @@ use manifactor::slam::variance::{BoxComponent, CrossValidationScore, MotionCompo
 /// The result of a run, as a table and a few lines. `details` adds the estimated noise, and the condition
 /// number and the factor with the largest cost of each variant.
 pub(crate) fn of_run(report: &RunReport, details: bool) -> String {
-    let header =
-        ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "iterations", "time"];
+    let header = [
+        "",
+        "ATE (m)",
+        "position (m)",
+        "shape",
+        "quality",
+        "volume",
+        "objects",
+        "boxes",
+        "cost",
+        "iterations",
+        "time",
+    ];
     let mut table = Table::of_numbers(&header).with_priority(&PRIORITY);
     if let Some(first) = report.variants.first() {
         table.row(before(first));
@@ -75,10 +86,11 @@ fn over(trajectory: &TrajectoryReport) -> String {
 /// Explanation of the columns about objects.
 const LANDMARKS: &str = "Errors of the objects against the truth. Position: RMSE of the centres. Shape: mean Jaccard distance of \
                          their bounding boxes with equal centres (0: equal, 1: no overlap). Quality: the same with the estimated \
-                         centres.";
+                         centres. Volume: the same for oriented boxes.";
 
 /// Columns that a narrow terminal shows first.
-const PRIORITY: [&str; 7] = ["ATE (m)", "position (m)", "shape", "quality", "cost", "iterations", "objects"];
+const PRIORITY: [&str; 8] =
+    ["ATE (m)", "position (m)", "shape", "quality", "volume", "cost", "iterations", "objects"];
 
 /// For a run frame by frame: the latencies, and the map after the last frame.
 fn stream(variant: &VariantReport) -> String {
@@ -249,6 +261,7 @@ fn before(variant: &VariantReport) -> Vec<String> {
         landmarks.map(|l| metres(l.rmse.position)),
         landmarks.map(|l| fraction(l.mean.shape)),
         landmarks.map(|l| fraction(l.mean.quality)),
+        landmarks.map(|l| fraction(l.mean.volume)),
         Some(variant.counts.objects.to_string()),
         Some(variant.counts.boxes.to_string()),
         None,
@@ -265,6 +278,7 @@ fn after(variant: &VariantReport) -> Vec<String> {
         row.position.map(metres),
         row.shape.map(fraction),
         row.quality.map(fraction),
+        row.volume.map(fraction),
         Some(row.objects.to_string()),
         Some(row.boxes.to_string()),
         Some(format!("{:.2}", row.final_cost)),

@@ -1,6 +1,8 @@
-//! Landmark metrics of Jablonsky et al.: the error of a mapped object.
+//! Landmark metrics of Jablonsky et al., and the overlap of oriented cuboids: the error of a mapped object.
 use crate::shapes::Box3;
 use crate::shapes::DualQuadric;
+use manifactor_geometry::Se3;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// Error of an estimated object against the true one, both in one frame.
@@ -14,16 +16,65 @@ pub struct LandmarkError {
     pub shape: f64,
     /// Jaccard distance between the two boxes at their actual positions: 0 to 1.
     pub quality: f64,
+    /// Jaccard distance between the oriented cuboids around the quadric and around the true object: 0 to 1. Unlike
+    /// the other measures, it includes the orientation.
+    pub volume: f64,
+}
+
+/// An oriented cuboid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cuboid {
+    /// Centre and axes.
+    pub pose: Se3,
+    /// Half extents along the axes, in metres.
+    pub half_extents: Vector3<f64>,
+}
+
+/// Sample points of a cuboid along each axis.
+const SAMPLES: usize = 40;
+
+impl Cuboid {
+    /// Returns the volume, in cubic metres.
+    pub fn volume(&self) -> f64 {
+        8.0 * self.half_extents.product()
+    }
+
+    /// Returns the intersection over union of two cuboids, from a grid of points in the smaller one. The error is
+    /// below 0.02; 0 if a volume is zero.
+    pub fn iou(&self, other: &Self) -> f64 {
+        let (small, large) = if self.volume() <= other.volume() { (self, other) } else { (other, self) };
+        let large_from_small = large.pose.between(&small.pose);
+        let at = |i: usize| (2 * i + 1) as f64 / SAMPLES as f64 - 1.0;
+        let mut inside = 0usize;
+        for (x, y, z) in (0..SAMPLES)
+            .flat_map(|x| (0..SAMPLES).map(move |y| (x, y)))
+            .flat_map(|(x, y)| (0..SAMPLES).map(move |z| (x, y, z)))
+        {
+            let point = Vector3::new(at(x), at(y), at(z)).component_mul(&small.half_extents);
+            let seen = large_from_small.act(&point);
+            inside += usize::from(seen.abs() <= large.half_extents);
+        }
+        let shared = small.volume() * inside as f64 / (SAMPLES * SAMPLES * SAMPLES) as f64;
+        if shared > 0.0 { shared / (small.volume() + large.volume() - shared) } else { 0.0 }
+    }
+}
+
+impl From<&Box3> for Cuboid {
+    fn from(b: &Box3) -> Self {
+        let pose = Se3 { translation: b.centroid(), ..Se3::identity() };
+        Self { pose, half_extents: (b.max - b.min) / 2.0 }
+    }
 }
 
 impl LandmarkError {
-    /// Computes the error of an estimate against the axis-aligned box of the true object.
-    pub fn of(estimate: &DualQuadric, truth: &Box3) -> Self {
+    /// Computes the error of an estimate against the axis-aligned box and the cuboid of the true object.
+    pub fn of(estimate: &DualQuadric, truth: &Box3, cuboid: &Cuboid) -> Self {
         let estimated = estimate.axes_aligned_box();
         Self {
             position: (estimate.centroid() - truth.centroid()).norm(),
             shape: 1.0 - estimated.centred().iou(&truth.centred()),
             quality: 1.0 - estimated.iou(truth),
+            volume: 1.0 - Cuboid { pose: estimate.pose, half_extents: estimate.semi_axes }.iou(cuboid),
         }
     }
 }
@@ -31,8 +82,11 @@ impl LandmarkError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use manifactor_geometry::{Se3, So3};
-    use nalgebra::Vector3;
+    use manifactor_geometry::So3;
+
+    fn error_of(estimate: &DualQuadric, truth: &Box3) -> LandmarkError {
+        LandmarkError::of(estimate, truth, &truth.into())
+    }
 
     #[test]
     fn position_shape_and_quality_are_apart() {
@@ -40,17 +94,17 @@ mod tests {
         let pose = Se3::new(So3::identity(), truth.centroid());
         let right = DualQuadric { pose, semi_axes: Vector3::repeat(1.0) };
         assert_eq!(
-            LandmarkError::of(&right, &truth),
-            LandmarkError { position: 0.0, shape: 0.0, quality: 0.0 }
+            error_of(&right, &truth),
+            LandmarkError { position: 0.0, shape: 0.0, quality: 0.0, volume: 0.0 }
         );
 
         let beside = DualQuadric { pose: Se3::new(So3::identity(), Vector3::new(2.0, 2.0, 3.0)), ..right };
-        let error = LandmarkError::of(&beside, &truth);
+        let error = error_of(&beside, &truth);
         assert_eq!((error.position, error.shape), (1.0, 0.0));
         assert!((error.quality - 2.0 / 3.0).abs() < 1e-15);
 
         let large = DualQuadric { semi_axes: Vector3::new(2.0, 1.0, 1.0), ..right };
-        let error = LandmarkError::of(&large, &truth);
+        let error = error_of(&large, &truth);
         assert_eq!((error.position, error.shape, error.quality), (0.0, 0.5, 0.5));
     }
 
@@ -60,8 +114,27 @@ mod tests {
         let pose = Se3::new(So3::identity(), Vector3::new(9.0, 0.0, 0.0));
         let far = DualQuadric { pose, semi_axes: Vector3::repeat(1.0) };
         assert_eq!(
-            LandmarkError::of(&far, &truth),
-            LandmarkError { position: 9.0, shape: 0.0, quality: 1.0 }
+            error_of(&far, &truth),
+            LandmarkError { position: 9.0, shape: 0.0, quality: 1.0, volume: 1.0 }
         );
+    }
+
+    #[test]
+    fn the_overlap_of_cuboids_depends_on_orientation_and_order_does_not_matter() {
+        let plate = |angle: f64, z: f64| Cuboid {
+            pose: Se3::new(So3::exp(&Vector3::new(0.0, angle, 0.0)), Vector3::new(0.0, 0.0, z)),
+            half_extents: Vector3::new(0.2, 0.1, 0.01),
+        };
+        let level = plate(0.0, 0.0);
+        assert_eq!(level.iou(&level), 1.0);
+        // half of the thickness is shared: 1/3
+        assert!((level.iou(&plate(0.0, 0.01)) - 1.0 / 3.0).abs() < 1e-9);
+        let crossed = level.iou(&plate(std::f64::consts::FRAC_PI_2, 0.0));
+        // a square column of 0.02 by 0.02 of a plate of 0.4 by 0.02
+        assert!((crossed - 0.05 / 1.95).abs() < 1e-3, "{crossed}");
+        let tilted = plate(0.3, 0.0);
+        assert!((level.iou(&tilted) - tilted.iou(&level)).abs() < 0.02);
+        let flat = Cuboid { half_extents: Vector3::new(0.2, 0.1, 0.0), ..level };
+        assert_eq!(level.iou(&flat), 0.0);
     }
 }

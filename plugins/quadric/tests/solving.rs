@@ -208,7 +208,7 @@ fn what_the_initialisers_find_is_where_a_solve_can_start() {
             values.insert("q", initialiser.initialise(&views).unwrap());
             let (solution, found) = run(&graph, &values);
             let truth = object().axes_aligned_box();
-            assert!(LandmarkError::of(&found, &truth).quality < 0.02 + 0.06 * noise);
+            assert!(LandmarkError::of(&found, &truth, &(&truth).into()).quality < 0.02 + 0.06 * noise);
             solution.outcome.final_cost
         });
         println!("{noise} px: final costs {costs:?}");

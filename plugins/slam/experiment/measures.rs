@@ -27,11 +27,12 @@ const ALIGNMENT_MEASURES: [TrajectoryMeasure; 9] = [
 ];
 
 /// Measures that do not depend on an alignment.
-const ESTIMATE_MEASURES: [EstimateMeasure; 34] = [
+const ESTIMATE_MEASURES: [EstimateMeasure; 35] = [
     ("position", |_, r| Some(r.landmarks?.estimate.rmse.position)),
     ("position_mean", |_, r| Some(r.landmarks?.estimate.mean.position)),
     ("shape", |_, r| Some(r.landmarks?.estimate.mean.shape)),
     ("quality", |_, r| Some(r.landmarks?.estimate.mean.quality)),
+    ("volume", |_, r| Some(r.landmarks?.estimate.mean.volume)),
     ("initial_position", |_, r| Some(r.landmarks?.initial.rmse.position)),
     ("initial_position_mean", |_, r| Some(r.landmarks?.initial.mean.position)),
     ("initial_shape", |_, r| Some(r.landmarks?.initial.mean.shape)),
@@ -74,7 +75,7 @@ const ESTIMATE_MEASURES: [EstimateMeasure; 34] = [
 /// - `gain_*` is the decrease of the ATE as a share of odometry's ATE. `gain_low_*` and `gain_high_*` are the
 ///   ends of its 95 % confidence interval, over blocks of ten seconds.
 /// - `position` is an RMSE, `position_mean` a mean.
-/// - `shape` and `quality` are mean Jaccard distances.
+/// - `shape`, `quality` and `volume` are mean Jaccard distances; `volume` is that of oriented cuboids.
 /// - `held_out_iou` is the mean over held-out boxes of mapped objects; in `held_out_iou_unmapped_as_zero`, boxes
 ///   of objects that are not in the map count as 0.
 /// - `completeness` is the number of objects in the map as a share of the detected ones.

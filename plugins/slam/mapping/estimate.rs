@@ -1,12 +1,14 @@
 //! Batch estimation: map and trajectory of a whole sequence.
+mod completion;
 pub mod refine;
 pub mod variance;
 pub mod visibility;
 
 use crate::estimate::refine::Refiner;
 use crate::estimate::variance::{VarianceComponents, VarianceError, VarianceSettings};
-use crate::mapping::{MappedObject, Mapping, pose_key};
-use crate::settings::RunSettings;
+use crate::mapping::{MappedObject, Mapping, MappingError, pose_key};
+use crate::settings::{DetectionSettings, RunSettings};
+pub use completion::CompletionOutcome;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Values};
@@ -31,6 +33,10 @@ pub struct Estimate {
     pub refinement_seconds: f64,
     /// The estimated noise of each round; empty if the noise is given.
     pub components: Vec<VarianceComponents>,
+    /// Result of the second stage, if there was one.
+    pub completion: Option<CompletionOutcome>,
+    /// Selection of the boxes in the graph.
+    pub detections: DetectionSettings,
 }
 
 /// Reason why there is no estimate.
@@ -43,6 +49,9 @@ pub enum EstimateError {
     /// The noise cannot be estimated.
     #[error(transparent)]
     Variance(#[from] VarianceError),
+    /// The complete graph cannot be created.
+    #[error(transparent)]
+    Mapping(#[from] MappingError),
 }
 
 /// Returns the graph with the semi-axes of all objects with orientation factors fixed; `None` if no object
@@ -153,12 +162,13 @@ impl Estimate {
     ) -> Result<Self, EstimateError> {
         let (most, loss) = (settings.objects.refinements, settings.detections.loss.as_ref());
         let Some(variance) = &settings.variance_components else {
-            return Ok(Self::solve(sequence, mapping, start, most, settings, observer)?);
+            return Self::solve(sequence, mapping, start, most, settings, observer)?
+                .complete(settings, observer);
         };
         let begin = VarianceComponents::initial(&mapping, variance);
         begin.apply_to_graph(&mut mapping, variance, loss)?;
         let estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
-        estimate.with_noise(variance, settings, observer)
+        estimate.with_noise(variance, settings, observer)?.complete(settings, observer)
     }
 
     /// Alternates between estimating the noise and solving.
@@ -228,7 +238,17 @@ impl Estimate {
             let refinement_seconds = rounds.refinement_seconds;
             rounds.sum_into(&mut joint.outcome);
             joint.outcome.initial_cost = initial_cost;
-            return Ok(Self { sequence, mapping, solution: joint, refinement_seconds, components: vec![] });
+            let (components, completion, detections) = (vec![], None, settings.detections.clone());
+            let solution = joint;
+            return Ok(Self {
+                sequence,
+                mapping,
+                solution,
+                refinement_seconds,
+                components,
+                completion,
+                detections,
+            });
         }
     }
 

@@ -15,7 +15,8 @@
 //! factor = { type = "beside" }
 //! noise = { sigma = 0.05 }
 //! ```
-//! The class `"*"` matches all classes. `semantics = "table_one"` selects the rules of the paper's Table I.
+//! The class `"*"` matches all classes. `semantics = "resting"` lets all objects rest on one of their sides, and
+//! `semantics = "table_one"` selects the rules of the paper's Table I.
 //! All rules that match an object apply to it.
 use manifactor_graph::checked::{Positive, Share};
 use manifactor_graph::loss::Loss;
@@ -42,10 +43,10 @@ pub use read::{RulesDocument, SemanticsDocument};
 pub use rule_factor::{RuleError, RuleFactor};
 
 /// The paper's Table I.
-pub(crate) const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
+const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
 
-/// Rule that streams add for the shapes of objects.
-const WEAK_SHAPE: &str = include_str!("semantics/weak_shape.toml");
+/// All objects rest on one of their sides, and have similar semi-axes.
+const RESTING: &str = include_str!("semantics/resting.toml");
 
 /// Name that matches all classes.
 const ANY_CLASS: &str = "*";
@@ -157,13 +158,8 @@ impl SemanticRule {
     }
 }
 
-/// Returns the text of a shipped file of rules.
-fn shipped_text(name: &str) -> Option<&'static str> {
-    (name == "table_one").then_some(TABLE_ONE)
-}
-
-/// Names of the shipped files.
-pub(crate) const SHIPPED_RULES: [&str; 1] = ["table_one"];
+/// Names and texts of the shipped files of rules.
+const SHIPPED_RULES: [(&str, &str); 2] = [("resting", RESTING), ("table_one", TABLE_ONE)];
 
 /// Returns the rules of the paper's Table I.
 ///
@@ -173,15 +169,13 @@ pub fn table_one() -> Result<Vec<SemanticRule>, manifactor_config::Diagnostics> 
     read::shipped_rules("table_one", TABLE_ONE)
 }
 
-/// Adds the weak `shape_prior` of streams, unless a rule has one.
-pub(crate) fn add_weak_shape(rules: &mut Vec<SemanticRule>) {
-    // cannot fail: this crate links the factor
-    let weak = read::shipped_rules("weak_shape", WEAK_SHAPE).unwrap_or_default();
-    let is_there = weak
-        .iter()
-        .any(|weak| rules.iter().any(|rule| rule.factor.factor_type() == weak.factor.factor_type()));
-    if !is_there {
-        rules.extend(weak);
+/// Adds the `shape_prior` of the rules `resting`, unless a rule has one.
+pub(crate) fn add_shape_prior(rules: &mut Vec<SemanticRule>) {
+    let is_shape_prior = |rule: &SemanticRule| rule.factor.factor_type() == "shape_prior";
+    if !rules.iter().any(is_shape_prior) {
+        // cannot fail: this crate links the factors
+        let shipped = read::shipped_rules("resting", RESTING).unwrap_or_default();
+        rules.extend(shipped.into_iter().filter(is_shape_prior));
     }
 }
 

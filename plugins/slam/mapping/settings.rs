@@ -1,7 +1,7 @@
 //! The settings of a run: how a sequence becomes a graph, and how the graph is solved.
 use crate::gravity::{Gravity, SourceGravity};
 use crate::motion::{MotionModel, OdometryMotion};
-use crate::semantics::{RuleError, SemanticRule, add_weak_shape, read_semantics};
+use crate::semantics::{RuleError, SemanticRule, add_shape_prior, read_semantics};
 use manifactor_association::{Association, GivenAssociation};
 use manifactor_config::{Diagnostics, Errors, Fault, Node, Section};
 use manifactor_recording::class::ClassAliases;
@@ -13,6 +13,7 @@ use std::hash::Hasher;
 use std::path::Path;
 use std::sync::Arc;
 
+mod completion;
 mod detections;
 mod evaluation;
 mod holdout;
@@ -24,6 +25,7 @@ mod report;
 pub mod run_document;
 mod variance;
 
+pub use completion::CompletionSettings;
 pub use detections::{CutSides, DetectionSettings};
 pub use evaluation::EvaluationSettings;
 pub use holdout::Holdout;
@@ -81,6 +83,9 @@ pub struct RunSettings {
     /// Estimation of the noise. Default: none; the noise is used as given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variance_components: Option<VarianceSettings>,
+    /// Second stage: all objects from all boxes, with fixed poses.
+    #[serde(default)]
+    pub completion: CompletionSettings,
     /// Solver of the graph. Default: Levenberg-Marquardt with equal damping in all directions.
     #[serde(default = "default_solver")]
     pub solver: Arc<dyn Optimizer>,
@@ -184,7 +189,7 @@ impl RunSettings {
     /// without limit.
     #[must_use]
     pub fn for_stream(mut self) -> Self {
-        add_weak_shape(&mut self.semantics);
+        add_shape_prior(&mut self.semantics);
         self
     }
 

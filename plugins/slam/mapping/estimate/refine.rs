@@ -60,7 +60,8 @@ pub fn refine_object(
     others: &Values,
     up: Option<Direction>,
 ) -> DualQuadric {
-    let (graph, mut values) = object_graph(key, start, entries.iter().copied(), others);
+    let (graph, mut values) = object_graph(&[key], entries.iter().copied(), others);
+    values.insert(key.clone(), start);
     // the joint solve reports a graph that cannot be compiled
     let Ok(mut problem) = Problem::compile(&graph, &values) else { return start };
     let mut best = (rank(&problem), start);
@@ -80,25 +81,25 @@ pub fn refine_object(
     best.1
 }
 
-/// Returns the graph of one object with its factors and its initial value. The further variables of these
-/// factors are fixed.
+/// Returns the graph of some objects with their factors and values. The further variables of these factors are
+/// fixed.
 pub(super) fn object_graph<'a>(
-    key: &Key,
-    start: DualQuadric,
+    objects: &[&Key],
     entries: impl Iterator<Item = &'a FactorEntry>,
-    others: &Values,
+    all: &Values,
 ) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     for entry in entries {
-        for other in entry.keys.iter().filter(|other| *other != key) {
-            if let (false, Some(value)) = (values.contains(other.as_str()), others.variable(other.as_str())) {
-                values.insert_boxed(other.clone(), value.erased().clone_box());
-                graph.fix(other.clone());
+        for key in &entry.keys {
+            if let (false, Some(value)) = (values.contains(key.as_str()), all.variable(key.as_str())) {
+                values.insert_boxed(key.clone(), value.erased().clone_box());
+                if !objects.contains(&key) {
+                    graph.fix(key.clone());
+                }
             }
         }
         graph.push(entry.clone());
     }
-    values.insert(key.clone(), start);
     (graph, values)
 }
 

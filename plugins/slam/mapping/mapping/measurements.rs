@@ -54,6 +54,8 @@ pub struct Measurements {
     pub cut: usize,
     /// Boxes that a later box of their object in their frame replaced.
     pub duplicates: usize,
+    /// Boxes that were removed because the ellipsoid of their object does not touch them.
+    pub untouched: usize,
 }
 
 impl Measurements {

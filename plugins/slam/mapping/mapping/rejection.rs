@@ -51,6 +51,18 @@ pub enum Rejection {
         /// Upper limit.
         limit: f64,
     },
+    /// The fit of its ellipsoid does not reach a minimum.
+    Stalled {
+        /// End of the solve.
+        termination: String,
+    },
+    /// Its estimated ellipsoid does not explain its boxes.
+    Misfit {
+        /// Median intersection over union of its boxes and the outline of the ellipsoid.
+        overlap: f64,
+        /// Lower limit.
+        limit: f64,
+    },
     /// The initialiser found no ellipsoid for its boxes.
     Initialisation {
         /// Message of the initialiser.
@@ -68,6 +80,8 @@ impl Rejection {
             Self::Moves { .. } | Self::Scatters { .. } => {
                 "larger errors of depths are allowed by `detections.depth_error`"
             }
+            Self::Stalled { .. } => "see whether some of its boxes show another object",
+            Self::Misfit { .. } => "`completion.min_overlap` sets the limit",
             Self::Initialisation { .. } => "try `objects.initialiser = { type = \"rays\" }`, or more views",
         }
     }
@@ -95,6 +109,13 @@ impl fmt::Display for Rejection {
                 "within seconds it seems to be in places that differ by {:.1} % of their depth, allowed are {:.1} %: it is several things, \
                  or `detections.depth_error` is too small",
                 100.0 * scatter,
+                100.0 * limit
+            ),
+            Self::Stalled { termination } => write!(f, "no ellipsoid is found for its boxes: {termination}"),
+            Self::Misfit { overlap, limit } => write!(
+                f,
+                "its boxes and its ellipsoid overlap by {:.0} % (median), at least {:.0} % are needed: they show several objects",
+                100.0 * overlap,
                 100.0 * limit
             ),
             Self::Initialisation { message } => f.write_str(message),

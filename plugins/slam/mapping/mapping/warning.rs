@@ -75,6 +75,14 @@ pub enum Warning {
         /// Standard deviation of the translation. Unit: metres.
         translation: f64,
     },
+    /// More than half of the fitted ellipsoids do not explain their boxes, so poses or camera are probably
+    /// wrong.
+    PosesMisfit {
+        /// Number of such ellipsoids.
+        misfits: usize,
+        /// Number of fitted ellipsoids.
+        fitted: usize,
+    },
     /// The map has no objects.
     NoObjects {
         /// Number of detected objects.
@@ -179,6 +187,11 @@ impl fmt::Display for Warning {
                 "boxes do not limit the shape of {}: {}; the factor `shape_prior` keeps the semi-axes of an object alike",
                 if objects.len() == 1 { "an object" } else { "objects" },
                 objects.join(", ")
+            ),
+            Self::PosesMisfit { misfits, fitted } => write!(
+                f,
+                "{misfits} of {fitted} ellipsoids do not fit their boxes: check that the poses are those of the camera (world \
+                 from camera, z forward, quaternion in the order of the format), and check the intrinsics"
             ),
             Self::Flat { objects } => write!(
                 f,

@@ -1,5 +1,5 @@
-//! `semantics = "table_one"`, `semantics = "my_rules.toml"`, or `[[semantics]]` rule by rule.
-use super::{SHIPPED_RULES, SemanticRule, shipped_text};
+//! `semantics = "resting"`, `semantics = "my_rules.toml"`, or `[[semantics]]` rule by rule.
+use super::{SHIPPED_RULES, SemanticRule};
 use manifactor_config::{Diagnostics, Document, Errors, Fault, Format, Node, Value, nearest, quoted_list};
 use manifactor_graph::Values;
 use schemars::JsonSchema;
@@ -38,9 +38,9 @@ pub(crate) fn read_semantics(
         Some(Node { place, value: Value::String(name) }) => match rules_named(name, folder, own) {
             Ok(rules) => rules,
             Err(ReadFailure::Unknown) => {
-                let known: Vec<String> = SHIPPED_RULES.iter().map(|s| (*s).to_owned()).collect();
-                let meant =
-                    nearest(name, SHIPPED_RULES).map_or(String::new(), |n| format!("did you mean `{n}`? "));
+                let names = SHIPPED_RULES.map(|(name, _)| name);
+                let known = names.map(str::to_owned);
+                let meant = nearest(name, names).map_or(String::new(), |n| format!("did you mean `{n}`? "));
                 let help =
                     format!("{meant}there is {}, or give the path of a .toml file", quoted_list(&known));
                 errors.report(place.clone(), Fault::with_help(format!("unknown semantics `{name}`"), help));
@@ -96,8 +96,8 @@ enum ReadFailure {
 }
 
 fn rules_named(name: &str, folder: &Path, own: &Values) -> Result<Vec<SemanticRule>, ReadFailure> {
-    match shipped_text(name) {
-        Some(text) => shipped_rules(name, text).map_err(ReadFailure::Wrong),
+    match SHIPPED_RULES.iter().find(|(shipped, _)| *shipped == name) {
+        Some((_, text)) => shipped_rules(name, text).map_err(ReadFailure::Wrong),
         None if Format::of_path(name).is_some() => Document::open(folder.join(name))
             .and_then(|document| rules_of(&document, own))
             .map_err(ReadFailure::Wrong),

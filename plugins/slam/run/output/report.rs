@@ -2,7 +2,7 @@
 use crate::output::map::gone_objects;
 use manifactor_graph::Direction;
 use manifactor_mapping::estimate::variance::{MotionChoice, VarianceComponents};
-use manifactor_mapping::estimate::{Estimate, LandmarkEstimate};
+use manifactor_mapping::estimate::{CompletionOutcome, Estimate, LandmarkEstimate};
 use manifactor_mapping::mapping::{MappedObject, Rejection, Warning};
 use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::{DualQuadric, LandmarkError};
@@ -71,6 +71,9 @@ pub struct VariantReport {
     /// Result of the stream, if frames arrived one by one. `solve` then describes the solve after it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub online: Option<OnlineReport>,
+    /// Result of the second stage, if there was one. `solve` then describes the first stage.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub completion: Option<CompletionOutcome>,
     /// Result of the solve.
     pub solve: SolveReport,
     /// Errors of the trajectory, if there is ground truth: one entry per alignment.
@@ -112,6 +115,8 @@ pub struct RunCounts {
     pub cut: usize,
     /// Boxes replaced by a later one of the same object in the same frame.
     pub duplicates: usize,
+    /// Boxes removed by the second stage because the ellipsoid of their object does not touch them.
+    pub untouched: usize,
     /// Detected objects.
     pub objects_detected: usize,
     /// Objects in the map.
@@ -200,6 +205,7 @@ impl VariantReport {
             association: None,
             prior_map: None,
             online: None,
+            completion: estimate.completion.clone(),
             solve,
             trajectory,
             landmarks,
@@ -240,6 +246,7 @@ impl RunCounts {
             low_score: m.low_score,
             cut: m.cut,
             duplicates: m.duplicates,
+            untouched: m.untouched,
             objects_detected: mapping.objects.len(),
             objects: mapping.mapped().count(),
             boxes: mapping.mapped().map(|object| object.boxes).sum(),

@@ -160,7 +160,8 @@ impl LeftOutObject {
     /// objects.
     fn cost(&self, poses: &Values, shapes: &Values) -> Result<f64, CompileError> {
         let Ok(shape) = shapes.get::<DualQuadric>(&self.key) else { return Ok(0.0) };
-        let (graph, values) = object_graph(&self.key, *shape, self.entries.iter(), poses);
+        let (graph, mut values) = object_graph(&[&self.key], self.entries.iter(), poses);
+        values.insert(self.key.clone(), *shape);
         let mut problem = Problem::compile(&graph, &values)?;
         coarse_solver(MAX_ITERATIONS, NotNegative::literal(MIN_RELATIVE_DECREASE))
             .descend(&mut problem, &mut Silent);

@@ -65,12 +65,12 @@ impl HeldOutReport {
         let mut classes: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for detection in held_out {
             let FilteredDetection::View(view) =
-                filter_detection(detection, &estimate.sequence.camera, &settings.detections)
+                filter_detection(detection, &estimate.sequence.camera, &estimate.detections)
             else {
                 continue;
             };
             let Some(object) = detection.object else { continue };
-            match predict_box(estimate, object, &view, settings) {
+            match predict_box(estimate, object, &view) {
                 Some(predicted) => {
                     let class = estimate.mapping.measurements.object(object).and_then(|own| own.class_name());
                     classes.entry(class.unwrap_or("unknown").to_owned()).or_default().push(all.len());
@@ -92,17 +92,12 @@ impl HeldOutReport {
 }
 
 /// Predicts a box; `None` if the object is not in the map.
-fn predict_box(
-    estimate: &Estimate,
-    object: ObjectId,
-    view: &ObjectBox,
-    settings: &RunSettings,
-) -> Option<PredictedBox> {
+fn predict_box(estimate: &Estimate, object: ObjectId, view: &ObjectBox) -> Option<PredictedBox> {
     let values = &estimate.solution.values;
     let quadric = values.get::<DualQuadric>(object_key(object).as_str()).ok()?;
     let pose = values.get::<Se3>(pose_key(view.frame).as_str()).ok()?;
     let (bounding_box, model, camera) =
-        (view.bounding_box, settings.detections.model, estimate.sequence.camera);
+        (view.bounding_box, estimate.detections.model, estimate.sequence.camera);
     let outline = BoundingBoxFactor { bounding_box, camera, model }.predict(pose, quadric);
     let outline = outline.filter(|_| quadric.is_in_front_of(pose));
     let pixels = outline.map(|outline| {

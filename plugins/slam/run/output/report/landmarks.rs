@@ -1,5 +1,5 @@
 use manifactor_mapping::estimate::{Estimate, LandmarkEstimate};
-use manifactor_quadric::LandmarkError;
+use manifactor_quadric::{Cuboid, LandmarkError};
 use serde::Serialize;
 
 /// Errors of all landmarks with known truth.
@@ -32,7 +32,9 @@ pub(super) fn in_truth_frame<'a>(
     let compare = |landmark: LandmarkEstimate<'a>| {
         let mut quadric = *landmark.quadric;
         quadric.pose = truth_from_map.compose(&quadric.pose);
-        let error = LandmarkError::of(&quadric, &landmark.truth?.bounding_box);
+        let truth = landmark.truth?;
+        let cuboid = Cuboid { pose: truth.world_from_object, half_extents: truth.half_extents };
+        let error = LandmarkError::of(&quadric, &truth.bounding_box, &cuboid);
         Some((landmark, error))
     };
     landmarks.into_iter().filter_map(compare).collect()
@@ -65,6 +67,7 @@ impl LandmarkSummary {
             position: average(|error| error.position, power),
             shape: average(|error| error.shape, power),
             quality: average(|error| error.quality, power),
+            volume: average(|error| error.volume, power),
         };
         (!errors.is_empty()).then(|| Self { mean: summary(1), rmse: summary(2) })
     }
@@ -76,9 +79,9 @@ mod tests {
 
     #[test]
     fn mean_and_rmse_are_apart() {
-        let error = |position| LandmarkError { position, shape: 0.5, quality: 1.0 };
+        let error = |position| LandmarkError { position, shape: 0.5, quality: 1.0, volume: 0.5 };
         let summary = LandmarkSummary::over(&[error(0.0), error(2.0)]).unwrap();
-        assert_eq!(summary.mean, LandmarkError { position: 1.0, shape: 0.5, quality: 1.0 });
+        assert_eq!(summary.mean, LandmarkError { position: 1.0, shape: 0.5, quality: 1.0, volume: 0.5 });
         assert_eq!(summary.rmse.position, 2f64.sqrt());
         assert_eq!(LandmarkSummary::over(&[]), None);
     }

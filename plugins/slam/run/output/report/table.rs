@@ -30,6 +30,8 @@ pub struct VariantRow {
     pub shape: Option<f64>,
     /// Mean Jaccard distance of the landmarks at their estimated poses, 0 to 1.
     pub quality: Option<f64>,
+    /// Mean Jaccard distance of oriented cuboids around the landmarks and around the true objects, 0 to 1.
+    pub volume: Option<f64>,
     /// Duration of the solve, including refinements. Unit: seconds.
     pub seconds: f64,
 }
@@ -60,6 +62,7 @@ impl VariantReport {
             position: landmarks.map(|l| l.rmse.position),
             shape: landmarks.map(|l| l.mean.shape),
             quality: landmarks.map(|l| l.mean.quality),
+            volume: landmarks.map(|l| l.mean.volume),
             seconds: self.solve.times.total + self.solve.refinement_seconds,
         }
     }
