@@ -288,7 +288,7 @@ fn after(variant: &VariantReport) -> Vec<String> {
     named(&row.variant, cells)
 }
 
-fn named(name: &str, cells: [Option<String>; 9]) -> Vec<String> {
+fn named(name: &str, cells: [Option<String>; 10]) -> Vec<String> {
     let cells = cells.into_iter().map(|cell| cell.unwrap_or_else(|| "-".into()));
     std::iter::once(name.to_owned()).chain(cells).collect()
 }

@@ -15,7 +15,7 @@ use manifactor_geometry::Se3;
 use manifactor_graph::{FactorEntry, Key, Values};
 use manifactor_quadric::{BoundingBoxFactor, BoxModel, Camera, DualQuadric};
 use manifactor_solve::{
-    CompileError, LevenbergMarquardt, Observer, Outcome, Silent, Stopping, Termination, solve,
+    CompileError, LevenbergMarquardt, Observer, Outcome, Silent, Stall, Stopping, Termination, solve,
 };
 use serde::Serialize;
 
@@ -220,7 +220,9 @@ impl FittedObjects {
             return Ok((quadric, Boxes::AllUsed));
         }
         let overlap_of = |view: &ObjectBox| overlap(view, &quadric, &self.values, camera);
-        if let Some(termination) = self.stalled.get(&object.key) {
+        // at a jump, the cost is least beside it
+        let is_jump = |end: &&Termination| matches!(end, Termination::Stalled { reason: Stall::Jump });
+        if let Some(termination) = self.stalled.get(&object.key).filter(|end| !is_jump(end)) {
             let before = measured.views.len();
             measured.views.retain(|view| overlap_of(view) > MIN_BOX_OVERLAP);
             if measured.views.len() == before || measured.views.len() < settings.objects.min_views {
