@@ -8,6 +8,7 @@
     clippy::print_stderr
 )]
 mod association;
+mod completion;
 mod evo;
 mod ground_robots;
 mod motion;
