@@ -44,11 +44,11 @@ struct OpportunityCounter {
 
 impl OpportunityCounter {
     /// Starts a new opportunity.
-    fn start_opportunity(&mut self, views: &[ObjectBox], sight: &VisibleObject) {
+    fn start_opportunity(&mut self, last_seen: Option<usize>, sight: &VisibleObject) {
         self.opportunities.all.expected += 1;
         let is_near = || self.seen_from.iter().any(|seen| seen.angle(&sight.from) < SAME_DIRECTION_RAD);
-        match views.last() {
-            Some(last) if sight.frame <= last.frame => self.opportunities.before.expected += 1,
+        match last_seen {
+            Some(last) if sight.frame <= last => self.opportunities.before.expected += 1,
             Some(_) => self.opportunities.since += usize::from(is_near()),
             None => self.opportunities.since += 1,
         }
@@ -76,14 +76,23 @@ pub fn count_opportunities(estimate: &Estimate, border: f64) -> BTreeMap<ObjectI
     let objects: Vec<ExpectedObject> = estimate.landmarks().iter().map(expected).collect();
     let trajectory = estimate.trajectory();
     let poses = trajectory.iter().enumerate().map(|(frame, at)| (frame, at.timestamp, at.pose));
+    // only frames with the whole object count as opportunities, so only whole boxes count as detections
+    let Camera { width, height, .. } = estimate.sequence.camera;
+    let is_whole = |view: &&ObjectBox| view.bounding_box.sides_inside(width, height, border) == [true; 4];
+    let frames_of = |measured: &ObjectMeasurements| {
+        let frames = measured.views.iter().filter(is_whole).map(|view| view.frame).collect();
+        (measured.id, frames)
+    };
+    let seen: BTreeMap<ObjectId, Vec<usize>> =
+        estimate.mapping.measurements.objects.iter().map(frames_of).collect();
     let mut all: BTreeMap<ObjectId, OpportunityCounter> = BTreeMap::new();
     visit_visible_objects(&objects, poses, &estimate.sequence.camera, border, |sight| {
         let counted = all.entry(sight.id).or_default();
-        let views = measured(sight.id).map_or(&[][..], |measured| &measured.views);
+        let frames = seen.get(&sight.id).map_or(&[][..], Vec::as_slice);
         if sight.begins {
-            counted.start_opportunity(views, &sight);
+            counted.start_opportunity(frames.last().copied(), &sight);
         }
-        if views.binary_search_by_key(&sight.frame, |view| view.frame).is_ok() {
+        if frames.binary_search(&sight.frame).is_ok() {
             counted.record_detection(sight.from);
         }
     });

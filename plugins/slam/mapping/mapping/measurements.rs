@@ -257,10 +257,11 @@ impl ObjectMeasurements {
         self.fusion.best()
     }
 
-    /// Returns the size of its smallest box, the square root of its area, in pixels. Includes the prior map;
-    /// `None` if unknown.
+    /// Returns the size of its smallest box that the border does not cut: the square root of its area, in pixels.
+    /// Includes the prior map; `None` if unknown.
     pub fn least_px(&self) -> Option<f64> {
-        let seen = self.views.iter().map(|view| view.bounding_box.area().sqrt()).filter(|size| *size > 0.0);
+        let whole = self.views.iter().filter(|view| view.inside == [true; 4]);
+        let seen = whole.map(|view| view.bounding_box.area().sqrt()).filter(|size| *size > 0.0);
         seen.chain(self.prior.as_ref().and_then(|prior| prior.least_px)).reduce(f64::min)
     }
 
