@@ -205,7 +205,7 @@ impl VariantReport {
             association: None,
             prior_map: None,
             online: None,
-            completion: estimate.completion.clone(),
+            completion: estimate.completion,
             solve,
             trajectory,
             landmarks,
