@@ -128,11 +128,9 @@ impl Estimate {
                     return Err(rejection.clone());
                 }
                 let checked = fitted.check(object, measured, sequence.camera, settings);
-                is_settled &= matches!(checked, Ok((_, Boxes::AllUsed)));
-                let (quadric, boxes) = checked?;
-                if let Boxes::Removed(removed) = boxes {
-                    untouched += removed;
-                }
+                is_settled &= matches!(checked, Ok((_, 0)));
+                let (quadric, removed) = checked?;
+                untouched += removed;
                 Ok(quadric)
             };
             starts = fitted.mapping.objects.iter().zip(&mut measurements.objects).map(&mut check).collect();
@@ -206,18 +204,18 @@ impl FittedObjects {
     }
 
     /// Returns the ellipsoid of a mapped object if its fit reached a minimum and explains its boxes. If the fit
-    /// stalled, removes the boxes that the ellipsoid does not touch, for another fit.
+    /// stalled, removes the boxes that the ellipsoid does not touch, for another fit, and returns their number.
     fn check(
         &self,
         object: &MappedObject,
         measured: &mut ObjectMeasurements,
         camera: Camera,
         settings: &RunSettings,
-    ) -> Result<(DualQuadric, Boxes), Rejection> {
+    ) -> Result<(DualQuadric, usize), Rejection> {
         let missing = Rejection::Views { views: 0, least: settings.objects.min_views };
         let quadric = *self.values.get::<DualQuadric>(&object.key).map_err(|_| missing)?;
         if measured.prior.is_some() {
-            return Ok((quadric, Boxes::AllUsed));
+            return Ok((quadric, 0));
         }
         let overlap_of = |view: &ObjectBox| overlap(view, &quadric, &self.values, camera);
         // at a jump, the cost is least beside it
@@ -228,24 +226,14 @@ impl FittedObjects {
             if measured.views.len() == before || measured.views.len() < settings.objects.min_views {
                 return Err(Rejection::Stalled { termination: termination.to_string() });
             }
-            return Ok((quadric, Boxes::Removed(before - measured.views.len())));
+            return Ok((quadric, before - measured.views.len()));
         }
         let mut overlaps: Vec<f64> = measured.views.iter().map(overlap_of).collect();
         overlaps.sort_by(f64::total_cmp);
         let overlap = overlaps.get(overlaps.len() / 2).copied().unwrap_or(1.0);
         let limit = *settings.completion.min_overlap;
-        if overlap < limit {
-            Err(Rejection::Misfit { overlap, limit })
-        } else {
-            Ok((quadric, Boxes::AllUsed))
-        }
+        if overlap < limit { Err(Rejection::Misfit { overlap, limit }) } else { Ok((quadric, 0)) }
     }
-}
-
-/// Boxes of an object after a check of its fit.
-enum Boxes {
-    AllUsed,
-    Removed(usize),
 }
 
 /// Returns the mapped objects in groups that factors connect, each with its factors.
