@@ -19,6 +19,12 @@ pub struct LandmarkError {
     /// Jaccard distance between the oriented cuboids around the quadric and around the true object: 0 to 1. Unlike
     /// the other measures, it includes the orientation.
     pub volume: f64,
+    /// Angle between the z axis of the true cuboid, which points up while the object rests as usual, and the
+    /// nearest principal axis of the quadric, in rad: 0 to 0.96.
+    pub tilt: f64,
+    /// Error of the proportions: RMS of the differences between the logarithms of the sorted semi-axes, each divided by
+    /// their geometric mean. 0.1 is about 10 %.
+    pub proportions: f64,
 }
 
 /// An oriented cuboid.
@@ -75,8 +81,28 @@ impl LandmarkError {
             shape: 1.0 - estimated.centred().iou(&truth.centred()),
             quality: 1.0 - estimated.iou(truth),
             volume: 1.0 - Cuboid { pose: estimate.pose, half_extents: estimate.semi_axes }.iou(cuboid),
+            tilt: tilt(&estimate.pose, &cuboid.pose),
+            proportions: (log_proportions(&estimate.semi_axes) - log_proportions(&cuboid.half_extents))
+                .norm()
+                / 3f64.sqrt(),
         }
     }
+}
+
+/// Returns the angle between the z axis of `truth` and the nearest axis of `estimate`, in rad.
+fn tilt(estimate: &Se3, truth: &Se3) -> f64 {
+    let up = truth.rotation.act(&Vector3::z());
+    // in the frame of the estimate, the largest component is the cosine to the nearest axis
+    let up = estimate.rotation.inverse().act(&up).abs();
+    let rest = up.norm_squared() - up.max().powi(2);
+    rest.max(0.0).sqrt().atan2(up.max())
+}
+
+/// Returns the sorted logarithms of semi-axes minus their mean.
+fn log_proportions(semi_axes: &Vector3<f64>) -> Vector3<f64> {
+    let mut logs = semi_axes.map(|axis| axis.max(f64::MIN_POSITIVE).ln());
+    logs.as_mut_slice().sort_by(f64::total_cmp);
+    logs.add_scalar(-logs.mean())
 }
 
 #[cfg(test)]
@@ -95,7 +121,14 @@ mod tests {
         let right = DualQuadric { pose, semi_axes: Vector3::repeat(1.0) };
         assert_eq!(
             error_of(&right, &truth),
-            LandmarkError { position: 0.0, shape: 0.0, quality: 0.0, volume: 0.0 }
+            LandmarkError {
+                position: 0.0,
+                shape: 0.0,
+                quality: 0.0,
+                volume: 0.0,
+                tilt: 0.0,
+                proportions: 0.0
+            }
         );
 
         let beside = DualQuadric { pose: Se3::new(So3::identity(), Vector3::new(2.0, 2.0, 3.0)), ..right };
@@ -115,8 +148,34 @@ mod tests {
         let far = DualQuadric { pose, semi_axes: Vector3::repeat(1.0) };
         assert_eq!(
             error_of(&far, &truth),
-            LandmarkError { position: 9.0, shape: 0.0, quality: 1.0, volume: 1.0 }
+            LandmarkError {
+                position: 9.0,
+                shape: 0.0,
+                quality: 1.0,
+                volume: 1.0,
+                tilt: 0.0,
+                proportions: 0.0
+            }
         );
+    }
+
+    #[test]
+    fn tilt_and_proportions_do_not_depend_on_the_order_and_the_size_of_axes() {
+        let cuboid = Cuboid { pose: Se3::identity(), half_extents: Vector3::new(0.1, 0.2, 0.4) };
+        let around = Box3::around(Vector3::zeros(), Vector3::repeat(1.0));
+        let error = |turn: Vector3<f64>, semi_axes: Vector3<f64>| {
+            let pose = Se3::new(So3::exp(&turn), Vector3::zeros());
+            let error = LandmarkError::of(&DualQuadric { pose, semi_axes }, &around, &cuboid);
+            (error.tilt, error.proportions)
+        };
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let turned = error(Vector3::new(quarter, 0.0, 0.0), Vector3::new(0.3, 1.2, 0.6));
+        assert!(turned.0 < 1e-12 && turned.1 < 1e-12, "{turned:?}");
+        let (tilt, _) = error(Vector3::new(0.0, 0.3, 0.0), cuboid.half_extents);
+        assert!((tilt - 0.3).abs() < 1e-12, "{tilt}");
+        // a ball: the logarithms differ by -ln 2, 0 and ln 2
+        let (_, proportions) = error(Vector3::zeros(), Vector3::repeat(0.2));
+        assert!((proportions - 2f64.ln() * (2.0f64 / 3.0).sqrt()).abs() < 1e-12, "{proportions}");
     }
 
     #[test]

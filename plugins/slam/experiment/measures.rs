@@ -27,12 +27,14 @@ const ALIGNMENT_MEASURES: [TrajectoryMeasure; 9] = [
 ];
 
 /// Measures that do not depend on an alignment.
-const ESTIMATE_MEASURES: [EstimateMeasure; 35] = [
+const ESTIMATE_MEASURES: [EstimateMeasure; 37] = [
     ("position", |_, r| Some(r.landmarks?.estimate.rmse.position)),
     ("position_mean", |_, r| Some(r.landmarks?.estimate.mean.position)),
     ("shape", |_, r| Some(r.landmarks?.estimate.mean.shape)),
     ("quality", |_, r| Some(r.landmarks?.estimate.mean.quality)),
     ("volume", |_, r| Some(r.landmarks?.estimate.mean.volume)),
+    ("tilt", |_, r| Some(r.landmarks?.estimate.mean.tilt)),
+    ("proportions", |_, r| Some(r.landmarks?.estimate.mean.proportions)),
     ("initial_position", |_, r| Some(r.landmarks?.initial.rmse.position)),
     ("initial_position_mean", |_, r| Some(r.landmarks?.initial.mean.position)),
     ("initial_shape", |_, r| Some(r.landmarks?.initial.mean.shape)),
@@ -76,6 +78,8 @@ const ESTIMATE_MEASURES: [EstimateMeasure; 35] = [
 ///   ends of its 95 % confidence interval, over blocks of ten seconds.
 /// - `position` is an RMSE, `position_mean` a mean.
 /// - `shape`, `quality` and `volume` are mean Jaccard distances; `volume` is that of oriented cuboids.
+/// - `tilt` is the mean angle between the true vertical axis of an object and the nearest principal axis, in rad, and
+///   `proportions` the mean RMS error of the logarithms of relative semi-axes.
 /// - `held_out_iou` is the mean over held-out boxes of mapped objects; in `held_out_iou_unmapped_as_zero`, boxes
 ///   of objects that are not in the map count as 0.
 /// - `completeness` is the number of objects in the map as a share of the detected ones.

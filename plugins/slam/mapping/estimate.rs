@@ -5,7 +5,7 @@ pub mod variance;
 pub mod visibility;
 
 use crate::estimate::refine::Refiner;
-use crate::estimate::variance::{VarianceComponents, VarianceError, VarianceSettings};
+use crate::estimate::variance::{MotionChoice, VarianceComponents, VarianceError, VarianceSettings};
 use crate::mapping::{MappedObject, Mapping, MappingError, pose_key};
 use crate::settings::{DetectionSettings, RunSettings};
 pub use completion::CompletionOutcome;
@@ -255,6 +255,13 @@ impl Estimate {
     /// Returns the estimated trajectory, in the map frame.
     pub fn trajectory(&self) -> Vec<StampedPose> {
         self.poses(&self.solution.values)
+    }
+
+    /// Returns whether the estimated noise keeps the poses of the odometry. Their covariance is then unknown,
+    /// and that of an object is conditional on them.
+    pub fn keeps_odometry(&self) -> bool {
+        let choice = self.components.last().and_then(|found| found.odometry.as_ref());
+        choice.is_some_and(MotionChoice::keeps_input)
     }
 
     /// Returns the trajectory of the odometry alone, in the map frame.

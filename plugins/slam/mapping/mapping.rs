@@ -91,7 +91,7 @@ pub enum MappingError {
 }
 
 /// Returns the frame of a pose key; `None` for any other key.
-pub(crate) fn frame_of(key: &Key) -> Option<usize> {
+pub fn frame_of(key: &Key) -> Option<usize> {
     key_number(key, "x")?.parse().ok()
 }
 

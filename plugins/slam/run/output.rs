@@ -22,6 +22,7 @@ use manifactor_formats::table::TableError;
 use manifactor_formats::tum;
 use manifactor_formats::whole;
 use manifactor_mapping::estimate::Estimate;
+use manifactor_mapping::mapping::frame_of;
 use manifactor_mapping::settings::run_document::{RunDocument, RunVariant, absolute_path, slug};
 use manifactor_recording::recording;
 use manifactor_solve::{CovarianceError, IterationRecord};
@@ -152,7 +153,13 @@ pub fn write_variant(
     write_whole(&file("iterations.csv"), iterations(&estimate.solution.outcome.history))?;
     write_document(&file("metrics.json"), format_results(report))?;
     if variant.settings.report.covariances {
-        let marginals = estimate.solution.marginals(&estimate.mapping.graph, &[])?;
+        let mut marginals = estimate.solution.marginals(&estimate.mapping.graph, &[])?;
+        if estimate.keeps_odometry() {
+            tracing::warn!(
+                "covariances.json has no poses: those of the odometry were kept, and their noise is unknown"
+            );
+            marginals.retain(|marginal| frame_of(&marginal.key).is_none());
+        }
         write_document(&file("covariances.json"), format_results(&marginals))?;
     }
     Ok(folder)

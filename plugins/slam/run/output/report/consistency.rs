@@ -15,7 +15,8 @@ use std::collections::HashMap;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ConsistencyReport {
     /// Mean over poses with six degrees of freedom, each compared with the true pose nearest in time. The
-    /// first pose aligns the trajectory with the ground truth, so its error is 0.
+    /// first pose aligns the trajectory with the ground truth, so its error is 0. `None` if the poses of the
+    /// odometry were kept, since their noise is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub poses: Option<f64>,
     /// Mean over the centres of objects with three degrees of freedom, in the odometry frame, if the ground
@@ -32,6 +33,7 @@ impl ConsistencyReport {
         let covariances: HashMap<Key, DMatrix<f64>> =
             marginals.into_iter().map(|marginal| (marginal.key, marginal.covariance)).collect();
         let poses = by_first_pose(truth, &estimate.trajectory(), settings).unwrap_or_default();
+        let poses = if estimate.keeps_odometry() { vec![] } else { poses };
         let frames = estimate.sequence.frames.iter().enumerate();
         let keys: HashMap<u64, Key> = frames.map(|(i, f)| (f.timestamp.to_bits(), pose_key(i))).collect();
         let poses = poses.iter().filter_map(|pair| {

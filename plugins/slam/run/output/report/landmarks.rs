@@ -68,6 +68,8 @@ impl LandmarkSummary {
             shape: average(|error| error.shape, power),
             quality: average(|error| error.quality, power),
             volume: average(|error| error.volume, power),
+            tilt: average(|error| error.tilt, power),
+            proportions: average(|error| error.proportions, power),
         };
         (!errors.is_empty()).then(|| Self { mean: summary(1), rmse: summary(2) })
     }
@@ -79,9 +81,16 @@ mod tests {
 
     #[test]
     fn mean_and_rmse_are_apart() {
-        let error = |position| LandmarkError { position, shape: 0.5, quality: 1.0, volume: 0.5 };
+        let error = |position| LandmarkError {
+            position,
+            shape: 0.5,
+            quality: 1.0,
+            volume: 0.5,
+            tilt: 0.1,
+            proportions: 0.25,
+        };
         let summary = LandmarkSummary::over(&[error(0.0), error(2.0)]).unwrap();
-        assert_eq!(summary.mean, LandmarkError { position: 1.0, shape: 0.5, quality: 1.0, volume: 0.5 });
+        assert_eq!(summary.mean, error(1.0));
         assert_eq!(summary.rmse.position, 2f64.sqrt());
         assert_eq!(LandmarkSummary::over(&[]), None);
     }
