@@ -89,7 +89,7 @@ pub(crate) struct Saved {
     pub removed_keys: RemovedKeys,
     #[serde(rename = "gone_factors")]
     pub removed_factors: NumberRanges,
-    /// Variables outside of the region of their linearization (`waiting`), far outside (`urgent`), and parked
+    /// Variables outside of the region of their linearization (`waiting`), far outside (`urgent`); and undetermined
     /// variables to check again (`doubtful`).
     pub waiting: Vec<u32>,
     pub urgent: Vec<u32>,

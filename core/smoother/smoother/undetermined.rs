@@ -69,8 +69,8 @@ impl Moves {
             model.count(f, is_whole);
             touched.variables.extend(model.factor(f).into_iter().flat_map(|f| f.variables()));
         }
-        let looked_at = touched.variables.iter().chain(&candidates).chain(&undetermined);
-        for v in looked_at.copied().collect::<BTreeSet<u32>>() {
+        let examined = touched.variables.iter().chain(&candidates).chain(&undetermined);
+        for v in examined.copied().collect::<BTreeSet<u32>>() {
             let is_in = factorization.contains(v);
             match (is_in, model.is_in_tree(v)) {
                 (false, true) => moves.entering.push(v),

@@ -248,7 +248,7 @@ fn what_is_associated_wrongly_in_a_crowd_is_mended_while_frames_come_and_when_no
             sequence.observations().map(|frame| mapper.add_frame(&frame).unwrap().moved.len()).sum::<usize>();
         let settled = mapper.finish_association();
         assert_eq!(settled.refused, Vec::<String>::new());
-        assert!(mapper.finish_association().moved.is_empty(), "all has been looked at");
+        assert!(mapper.finish_association().moved.is_empty(), "all boxes have been assigned");
         (come, settled.moved.len())
     };
     let (with, without) = (moved(&settings), moved(&never));
@@ -299,7 +299,7 @@ fn depths_place_objects_at_once_and_tell_what_moves() {
     let (f1, f1_without) =
         (scores(&estimate(&settings, &measured)).f1, scores(&estimate(&without, &sequence)).f1);
     assert!(f1 > f1_without - 0.01, "{f1} {f1_without}");
-    let born = |settings: &RunSettings, sequence: &Sequence| {
+    let initialized = |settings: &RunSettings, sequence: &Sequence| {
         let mut mapper = Mapper::new(sequence.header(), settings);
         sequence
             .observations()
@@ -307,7 +307,7 @@ fn depths_place_objects_at_once_and_tell_what_moves() {
             .map(|frame| mapper.add_frame(&frame).unwrap().initialized.len())
             .sum::<usize>()
     };
-    let (early, late) = (born(&settings, &measured), born(&without, &sequence));
+    let (early, late) = (initialized(&settings, &measured), initialized(&without, &sequence));
     assert!(early > late + 5, "{early} {late}");
     let mut moved = Sequence::clone(&measured);
     let id = moved.detections[0].object.unwrap();

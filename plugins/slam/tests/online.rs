@@ -133,9 +133,12 @@ fn a_map_that_grew_ends_as_the_batch_does() {
     let (found, expected) = (online.solve.final_cost, batch.solve.final_cost);
     assert!(found <= expected * (1.0 + 1e-3), "{found} {expected}");
     let stream = online.online.unwrap();
-    let born: usize = kept.0.iter().map(|frame| frame.initialized.len()).sum();
-    assert_eq!((stream.initialized, stream.objects, stream.refusals), (born, born - stream.removed, 0));
-    assert!(born >= 4, "objects come before the end: {born} of {}", online.counts.objects);
+    let initialized: usize = kept.0.iter().map(|frame| frame.initialized.len()).sum();
+    assert_eq!(
+        (stream.initialized, stream.objects, stream.refusals),
+        (initialized, initialized - stream.removed, 0)
+    );
+    assert!(initialized >= 4, "objects come before the end: {initialized} of {}", online.counts.objects);
     // the live estimate differs from the final one, but not by much
     let (live, end) = (stream.trajectory[0].estimate.ate.rmse, online.trajectory[0].estimate.ate.rmse);
     assert!(live < 4.0 * end.max(0.01), "{live} {end}");
@@ -191,16 +194,16 @@ fn an_object_of_several_things_is_removed_again_and_does_not_come_back() {
         detection.bounding_box.xmax = bounds[0] + 4.0 * (bounds[2] - bounds[0]);
     }
     let mut mapper = Mapper::new(sequence.header(), &settings);
-    let (mut born, mut withdrawn) = (vec![], vec![]);
+    let (mut initialized, mut removed) = (vec![], vec![]);
     for observation in sequence.observations() {
         let report = mapper.add_frame(&observation).unwrap();
         assert_eq!(report.refused, Vec::<String>::new());
-        born.extend(report.initialized);
-        withdrawn.extend(report.removed);
+        initialized.extend(report.initialized);
+        removed.extend(report.removed);
     }
     let key = format!("q{one}");
-    assert_eq!(born.iter().filter(|born| born.as_str() == key).count(), 1, "{born:?}");
-    assert!(withdrawn.iter().any(|gone| gone.as_str() == key), "{withdrawn:?}");
+    assert_eq!(initialized.iter().filter(|added| added.as_str() == key).count(), 1, "{initialized:?}");
+    assert!(removed.iter().any(|gone| gone.as_str() == key), "{removed:?}");
     assert!(mapper.smoother().estimate(&key).is_none());
 }
 

@@ -116,15 +116,15 @@ impl LiveMap {
             measured.and_then(ObjectMeasurements::class_name)
         };
         self.notes.add_events(report, |id| mapper.id_changes().current_id(id), class);
-        let parked = report
+        let undetermined = report
             .updates
             .last()
             .map(|update| (&update.undetermined_variables, &update.undetermined_directions));
-        if let Some((parked, undetermined)) = parked {
-            self.waiting = parked.len() + undetermined.len();
-            let parked = parked.iter().map(ToString::to_string);
-            let directions = undetermined.iter().map(|(key, direction)| format!("{key}: {direction}"));
-            self.undetermined = parked.chain(directions).take(NAMED).collect();
+        if let Some((variables, directions)) = undetermined {
+            self.waiting = variables.len() + directions.len();
+            let variables = variables.iter().map(ToString::to_string);
+            let directions = directions.iter().map(|(key, direction)| format!("{key}: {direction}"));
+            self.undetermined = variables.chain(directions).take(NAMED).collect();
         }
         self.update_objects(mapper);
         if let Some(observation) = observation {

@@ -38,7 +38,7 @@ impl StreamWatcher for Gaps {
                 self.batches.push(report.frame);
             }
             let what = format!(
-                "born {} revised {} redone {:?} damped {:?} passes {:?} batch {:?}",
+                "initialized {} revised {} redone {:?} damped {:?} passes {:?} batch {:?}",
                 report.initialized.len(),
                 report.revised.len(),
                 report.updates.iter().map(|u| u.refactorized).collect::<Vec<_>>(),
@@ -109,7 +109,7 @@ fn print_report(report: &VariantReport, batch: &VariantReport) {
         online.bytes / 1_000_000
     );
     println!(
-        "  {} objects live ({} born, {} withdrawn, {} revised, {} refused), {} at the end, {} in batch; {} boxes, {}",
+        "  {} objects live ({} initialized, {} removed, {} revised, {} refused), {} at the end, {} in batch; {} boxes, {}",
         online.objects,
         online.initialized,
         online.removed,

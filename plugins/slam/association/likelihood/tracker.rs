@@ -140,13 +140,13 @@ impl Tracker {
     fn assign_known(&self, image: &FrameDetections<'_>, map: &dyn MapEstimate) -> Vec<Option<ObjectId>> {
         let mut names = vec![None; image.detections.len()];
         let Some(pose) = map.pose(image.frame) else { return names };
-        let looked_at = best_scores(image.detections);
-        let (gains, tracks) = self.gains(image, &looked_at, &pose);
-        let matched = best_assignment(looked_at.len(), tracks.len(), &gains);
-        for (i, column) in looked_at.iter().zip(matched) {
+        let scored = best_scores(image.detections);
+        let (gains, tracks) = self.gains(image, &scored, &pose);
+        let matched = best_assignment(scored.len(), tracks.len(), &gains);
+        for (i, column) in scored.iter().zip(matched) {
             names[*i] = column.map(|column| self.tracks[tracks[column]].id);
         }
-        for i in looked_at {
+        for i in scored {
             if names[i].is_none() {
                 names[i] = self.twin_object(image.detections, &names, i);
             }

@@ -95,8 +95,8 @@ impl Mapper {
         match self.smoother.update() {
             Ok(update) => report.updates.push(update),
             Err(error) => {
-                let withdrawn = report.removed.drain(gone..);
-                let keys = report.initialized.drain(..).chain(withdrawn).chain(report.revised.drain(..));
+                let removed = report.removed.drain(gone..);
+                let keys = report.initialized.drain(..).chain(removed).chain(report.revised.drain(..));
                 let keys: Vec<Key> = keys.collect();
                 let keys: Vec<&str> = keys.iter().map(Key::as_str).collect();
                 report.refused.push(format!("changes of {}: {error}", keys.join(", ")));
@@ -203,10 +203,10 @@ impl Mapper {
         let started =
             rejection::initial_quadric(measured, |i| self.stamped_pose(i), self.camera, &self.settings);
         let (views, class) = (measured.views.clone(), measured.class_name().map(str::to_owned));
-        let born = started.map_err(|rejection| rejection.to_string());
-        let born = born.and_then(|start| self.push_object(id, start, &views));
-        let (start, boxes) = match born {
-            Ok(born) => born,
+        let pushed = started.map_err(|rejection| rejection.to_string());
+        let pushed = pushed.and_then(|start| self.push_object(id, start, &views));
+        let (start, boxes) = match pushed {
+            Ok(pushed) => pushed,
             Err(why) => {
                 tracing::info!(object = %id, "not placed yet: {why}");
                 if let Some(ObjectState::Tentative(sights)) = self.objects.get_mut(&id) {

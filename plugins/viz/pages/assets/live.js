@@ -23,7 +23,7 @@ class GrowingMap extends MapView {
 }
 
 // Names of the counts of events.
-const COUNTS = { born: "added", withdrawn: "removed", moved: "boxes moved", merged: "merged", forgotten: "dropped", refused: "refused", rejected: "outliers" };
+const COUNTS = { initialized: "added", removed: "removed", moved: "boxes moved", merged: "merged", forgotten: "dropped", refused: "refused", rejected: "outliers" };
 
 class LivePage {
   constructor() {

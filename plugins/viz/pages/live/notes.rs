@@ -14,8 +14,8 @@ const LONGEST: usize = 300;
 /// Counts of all events, and the newest as text.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Notes {
-    born: usize,
-    withdrawn: usize,
+    initialized: usize,
+    removed: usize,
     moved: usize,
     merged: usize,
     forgotten: usize,
@@ -48,8 +48,8 @@ impl Notes {
                 ),
             );
         }
-        self.born += report.initialized.len();
-        self.withdrawn += report.removed.len();
+        self.initialized += report.initialized.len();
+        self.removed += report.removed.len();
         self.moved += report.moved.len();
         self.merged += report.merged.len();
         self.forgotten += report.forgotten.len();
@@ -115,8 +115,8 @@ impl Notes {
     pub(super) fn to_json(&self) -> Value {
         json!({
             "counts": {
-                "born": self.born,
-                "withdrawn": self.withdrawn,
+                "initialized": self.initialized,
+                "removed": self.removed,
                 "moved": self.moved,
                 "merged": self.merged,
                 "forgotten": self.forgotten,

@@ -69,7 +69,7 @@ impl StreamWatcher for Shown {
         let notes = self.live.notes.to_json();
         assert!(notes["newest"].to_string().contains("relocalized in the prior map"), "{notes}");
         // objects that were added to the discarded map are not counted
-        assert_eq!(notes["counts"]["born"], report.map_or(0, |report| report.initialized.len()));
+        assert_eq!(notes["counts"]["initialized"], report.map_or(0, |report| report.initialized.len()));
         ControlFlow::Continue(())
     }
 }

@@ -195,7 +195,7 @@ fn one_pair_or_none_is_no_place() {
 fn matches_are_within_reach_of_the_position_that_is_reported_with_them() {
     // marks with larger errors than assumed, so that matches come and go
     let map = table(&["cup"], Some(Direction::Z));
-    let mut looked_at = 0;
+    let mut compared = 0;
     for draw in 0..40 {
         let (mut marks, up) = local_objects(&map, &any_other_pose(), 0);
         for (mark, [x, y]) in marks.iter_mut().zip(scattered(8 * (draw + 1)).skip(8 * draw as usize)) {
@@ -203,9 +203,9 @@ fn matches_are_within_reach_of_the_position_that_is_reported_with_them() {
         }
         let layout = Layout::new(marks, up, &map, false);
         for (_, place, matches) in layout.ranked_poses() {
-            looked_at += 1;
+            compared += 1;
             assert!(matches.iter().all(|pair| layout.gain(&place, pair).is_some()));
         }
     }
-    assert!(looked_at > 100, "{looked_at}");
+    assert!(compared > 100, "{compared}");
 }
