@@ -57,7 +57,7 @@ fn each_figure_has_its_command_and_each_row_its_figure() {
     for (row, name) in rows.iter().zip(names) {
         assert_eq!(row.len(), 3, "{name}: figure, content, command");
         assert!(docs().join("figures").join(name).is_file(), "{name} does not exist");
-        if let Some((_, own)) = row[2].split_once("--example figures -- ") {
+        if let Some((_, own)) = row[2].split_once("figures -- ") {
             let own = own.trim_end_matches('`');
             assert!(drawn.contains(&format!("(\"{own}\", {own})")), "{own} is no figure of the example");
         }

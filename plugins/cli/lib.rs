@@ -9,7 +9,8 @@
 //! }
 //! ```
 //!
-//! The exit codes are documented at [`Status`] and [`Failure`], and in a table in `docs/reliability.md`.
+//! The exit codes are documented at [`Status`] and [`Failure`], and in
+//! `docs/reference/exit-codes.md`.
 // this crate reads untrusted input, so no index may be taken for granted
 #![warn(clippy::indexing_slicing)]
 mod arguments;

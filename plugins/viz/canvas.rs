@@ -16,19 +16,26 @@ pub(crate) struct Sheet {
     pub(crate) width: f64,
     pub(crate) height: f64,
     pub(crate) items: Vec<Item>,
-    /// Axis of time, for the cursor that all charts of a page share.
-    pub(crate) time: Option<TimeAxis>,
+    /// Panels with curves, from top to bottom, so that a page can show values under the pointer.
+    pub(crate) panels: Vec<Panel>,
+    /// True if the horizontal axis is time, for the cursor that all charts of a page share.
+    pub(crate) is_over_time: bool,
 }
 
-/// A horizontal axis of time.
+/// The area and the scales of a panel with curves.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct TimeAxis {
-    /// First and last position on the sheet. Unit: pixels.
-    pub(crate) x: [f64; 2],
-    /// Times at these positions. Unit: seconds.
-    pub(crate) seconds: [f64; 2],
-    /// Top and bottom of the charts. Unit: pixels.
-    pub(crate) y: [f64; 2],
+pub(crate) struct Panel {
+    /// xmin, ymin, xmax, ymax. Unit: pixels.
+    pub(crate) area: [f64; 4],
+    pub(crate) x: PanelAxis,
+    pub(crate) y: PanelAxis,
+}
+
+/// Values at the ends of an axis, and whether it is logarithmic.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PanelAxis {
+    pub(crate) ends: [f64; 2],
+    pub(crate) log: bool,
 }
 
 /// One element of a sheet; later ones cover earlier ones.
@@ -102,7 +109,7 @@ impl Text {
 
 impl Sheet {
     pub(crate) fn new(width: f64, height: f64) -> Self {
-        Self { width, height, items: vec![], time: None }
+        Self { width, height, ..Self::default() }
     }
 
     pub(crate) fn text(&mut self, text: Text) {

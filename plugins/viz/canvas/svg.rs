@@ -1,5 +1,5 @@
 //! The SVG of a sheet.
-use super::{Anchor, DASHES, Ink, Item, Sheet, Stroke, Text, Theme};
+use super::{Anchor, DASHES, Ink, Item, Panel, PanelAxis, Sheet, Stroke, Text, Theme};
 use crate::xml::escape;
 use std::fmt::Write as _;
 
@@ -29,21 +29,34 @@ impl Sheet {
     /// Returns an SVG document, or a part of a page. Screen readers read `title` instead of the picture.
     pub(crate) fn svg(&self, title: &str, colors: Colors) -> String {
         let (width, height) = (number(self.width), number(self.height));
-        let time = self.time.filter(|_| colors == Colors::OfPage).map(|time| {
-            let numbers = [time.x, time.seconds, time.y].concat();
-            let numbers: Vec<String> = numbers.into_iter().map(|x| format!("{x:.3}")).collect();
-            format!("data-time=\"{}\" ", numbers.join(" "))
-        });
-        let time = time.unwrap_or_default();
+        let for_scripts = if colors == Colors::OfPage { self.panels_for_scripts() } else { String::new() };
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
-             {time}role=\"img\" font-family=\"{FONT}\" stroke-linejoin=\"round\" stroke-linecap=\"butt\">\n<title>{}</title>\n",
+             {for_scripts}role=\"img\" font-family=\"{FONT}\" stroke-linejoin=\"round\" stroke-linecap=\"butt\">\n<title>{}</title>\n",
             escape(title)
         );
         if let Colors::Of(_) = colors {
             svg += &format!("<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>\n", colors.of(Ink::Paper));
         }
         svg + &self.parts(colors) + "</svg>\n"
+    }
+
+    /// Returns the attributes that the scripts of a page read. `data-panels` has for each panel its area and,
+    /// for x and y, the ends of the axis and 1 if it is logarithmic.
+    fn panels_for_scripts(&self) -> String {
+        let axis = |axis: PanelAxis| [axis.ends[0], axis.ends[1], f64::from(u8::from(axis.log))];
+        let panel = |panel: &Panel| {
+            let numbers = panel.area.into_iter().chain(axis(panel.x)).chain(axis(panel.y));
+            numbers.map(|x| format!("{x:e}")).collect::<Vec<_>>().join(" ")
+        };
+        let panels: Vec<String> = self.panels.iter().map(panel).collect();
+        match panels.as_slice() {
+            [] => String::new(),
+            panels => {
+                let time = if self.is_over_time { "data-time=\"\" " } else { "" };
+                format!("data-panels=\"{}\" {time}", panels.join(";"))
+            }
+        }
     }
 
     /// Returns the elements of the sheet, without the document around them.

@@ -1,6 +1,6 @@
 //! The frame of a chart: its scales on the sheet, and the lines and numbers around it.
 use super::scale::Scale;
-use crate::canvas::{Anchor, Ink, Sheet, Stroke, Text, text_width};
+use crate::canvas::{Anchor, Ink, Panel, Sheet, Stroke, Text, text_width};
 
 /// Font sizes of numbers, labels and titles. Unit: pixels.
 pub(crate) const NUMBERS: f64 = 11.0;
@@ -40,6 +40,10 @@ impl Axes {
     pub(crate) fn point(&self, x: f64, y: f64) -> [f64; 2] {
         let [xmin, ymin, xmax, ymax] = self.area;
         [xmin + self.x.place(x) * (xmax - xmin), ymax - self.y.place(y) * (ymax - ymin)]
+    }
+
+    pub(crate) fn panel(&self) -> Panel {
+        Panel { area: self.area, x: self.x.axis(), y: self.y.axis() }
     }
 
     /// Draws the grid, the numbers and the labels.

@@ -3,7 +3,7 @@ use super::axes::{Axes, HEAD, title};
 use super::legend::{Entry, legend};
 use super::scale::Scale;
 use super::series::stretches;
-use crate::canvas::{Ink, Sheet, Stroke, TimeAxis};
+use crate::canvas::{Ink, Sheet, Stroke};
 
 /// Label of an axis of time since the first frame.
 pub(crate) const TIME: &str = "time (s)";
@@ -88,17 +88,14 @@ pub(crate) fn figure(
     title(&mut sheet, text);
     sheet.place(entries, [10.0, HEAD]);
     let last = panels.len() - 1;
-    if x == TIME && !log_x {
-        let (from, to) = along.ends();
-        let bottom = top + each * panels.len() as f64 - 22.0;
-        sheet.time = Some(TimeAxis { x: [10.0 + left, width - 18.0], seconds: [from, to], y: [top, bottom] });
-    }
+    sheet.is_over_time = x == TIME && !log_x;
     for (i, (panel, y)) in panels.iter().zip(scales).enumerate() {
         let ymin = top + i as f64 * each;
         let x_label = if i == last { x.to_owned() } else { String::new() };
         let area = [10.0 + left, ymin, width - 18.0, ymin + each - 22.0];
         let axes = Axes { area, x: along, y, x_label, y_label: panel.y.clone() };
         axes.draw(&mut sheet);
+        sheet.panels.push(axes.panel());
         for Curve { stroke, points, dots, .. } in &panel.curves {
             let known = points.iter().map(|p| shown(panel, p).then(|| axes.point(p.0, p.1)));
             for points in stretches(known).into_iter().map(thinned) {
@@ -165,20 +162,23 @@ mod tests {
     }
 
     #[test]
-    fn charts_over_time_tell_a_page_where_their_axis_is() {
+    fn charts_tell_a_page_their_scales() {
         let chart = |x: &str, colors| {
             let curves = vec![Curve::new("c", Ink::Series(0), vec![(0.0, 1.0), (8.0, 2.0)])];
             let panel = Chart { curves, ..Chart::default() };
             figure("", x, false, &[panel], 700.0, 400.0).unwrap().svg("", colors)
         };
         let svg = chart(TIME, Colors::OfPage);
-        let (_, rest) = svg.split_once("data-time=\"").unwrap();
+        let (_, rest) = svg.split_once("data-panels=\"").unwrap();
         let numbers: Vec<f64> =
             rest.split('"').next().unwrap().split(' ').map(|x| x.parse().unwrap()).collect();
-        assert_eq!(numbers[2..4], [0.0, 8.0]);
-        assert!(numbers[0] < numbers[1] && numbers[4] < numbers[5], "{numbers:?}");
-        assert!(!chart("steps", Colors::OfPage).contains("data-time"));
-        assert!(!chart(TIME, Colors::Of(Theme::Light)).contains("data-time"));
+        let [xmin, ymin, xmax, ymax, from, to, log_x, low, high, log_y] = numbers[..] else {
+            panic!("{svg}")
+        };
+        assert!(xmin < xmax && ymin < ymax && low <= 1.0 && high >= 2.0, "{numbers:?}");
+        assert_eq!([from, to, log_x, log_y], [0.0, 8.0, 0.0, 0.0]);
+        assert!(svg.contains("data-time") && !chart("steps", Colors::OfPage).contains("data-time"));
+        assert!(!chart(TIME, Colors::Of(Theme::Light)).contains("data-"));
     }
 
     #[test]

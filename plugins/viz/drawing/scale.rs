@@ -1,4 +1,5 @@
 //! An axis: its range and its ticks.
+use crate::canvas::PanelAxis;
 
 /// Largest absolute value on an axis; margins and ratios of larger numbers would overflow.
 pub(crate) const FAR: f64 = 1e300;
@@ -51,6 +52,10 @@ impl Scale {
     /// Returns the first and the last value.
     pub(crate) fn ends(&self) -> (f64, f64) {
         (self.low, self.high)
+    }
+
+    pub(crate) fn axis(&self) -> PanelAxis {
+        PanelAxis { ends: [self.low, self.high], log: self.log }
     }
 
     /// Adds a share of the range above, and also below unless the axis begins at zero.

@@ -19,6 +19,8 @@ pub(crate) struct Page {
 }
 
 const STYLE: &str = include_str!("assets/page.css");
+/// Script that shows the values of charts under the pointer. A page with charts adds it.
+pub(super) const VALUES: &str = include_str!("assets/values.js");
 /// Content security policy: run the embedded code, and fetch nothing.
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
@@ -181,7 +183,8 @@ impl Page {
         let (above, below) = self.body.split_at(self.contents.unwrap_or(0));
         let contents = if self.contents.is_some() { self.table_of_contents() } else { String::new() };
         let (light, dark) = (style_sheet(Theme::Light), style_sheet(Theme::Dark));
-        let theme = format!(":root{{{light}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n");
+        let theme =
+            format!(":root{{{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n");
         let (style, more) = (self.style, if self.is_live { LIVE } else { ("", "") });
         let scripts = match self.scripts.as_str() {
             "" => String::new(),

@@ -1,6 +1,7 @@
 //! The page of a run: the map in 3D, its variants side by side, and the factors of each object.
 use super::run_tables::{held_out, noise, objects, overview, own_variables, words};
-use super::{page::Page, verdict::verdict, viewer};
+use super::page::{Page, VALUES};
+use super::{verdict::verdict, viewer};
 use crate::drawing::{Palette, Picture, Scene, Viewpoint, map};
 use crate::run::{RESIDUALS, cost, images, maps_and_charts, residual_row};
 use manifactor_slam::record::{RunRecord, VariantRecord};
@@ -53,6 +54,7 @@ pub fn run_page(report: &RunReport, record: &RunRecord, configs: &[String]) -> S
         variant(&mut page, report, record, &palette, config);
     }
     page.heading("Files").files(&["report.json".to_owned(), "record.json".to_owned()]);
+    page.own("", VALUES);
     page.paragraph(&version());
     page.html()
 }

@@ -1,4 +1,4 @@
-//! The table of exit codes in `docs/reliability.md`.
+//! The table of endings in `docs/reference/exit-codes.md`.
 use crate::endings::interrupt::{AtWork, ENDLESS, RUN};
 use crate::{folder, path, root, run};
 use std::process::{Command, Stdio};
@@ -149,8 +149,8 @@ fn codes(ending: &str) -> Vec<i32> {
 #[test]
 #[cfg(unix)]
 fn every_ending_of_the_table_has_its_code() {
-    let page = std::fs::read_to_string(root().join("docs/reliability.md")).unwrap();
-    let (_, table) = page.split_once("## Exit codes\n").unwrap();
+    let page = std::fs::read_to_string(root().join("docs/reference/exit-codes.md")).unwrap();
+    let (_, table) = page.split_once("### Endings\n").unwrap();
     let table = table.split("\n\n").find(|part| part.starts_with('|')).unwrap();
     let rows: Vec<(&str, i32)> = table
         .lines()

@@ -132,6 +132,35 @@ fn the_map_turns_zooms_and_tells_of_an_object() {
     assert_eq!(browser.value(cursors), browser.value("document.querySelectorAll('svg[data-time]').length"));
     browser.value("mapView.goToTime(mapView.longest.frames[7][0] + 0.01); 0");
     browser.until("canvas.dataset.frame === '7'");
+    // the chart of errors has the value of a curve under the pointer
+    browser.value(
+        "const chart = document.querySelector('svg[data-time]'); chart.scrollIntoView({ block: 'center' });
+         const around = chart.getBoundingClientRect();
+         window.spot = { x: around.x + around.width / 2, y: around.y + around.height / 2 }; 0",
+    );
+    let spot = ["spot.x", "spot.y"].map(|place| number(&mut browser, place));
+    let event = serde_json::json!({ "type": "mouseMoved", "x": spot[0], "y": spot[1] });
+    browser.call("Input.dispatchMouseEvent", event);
+    browser.until("chart.querySelector('text.value').textContent.includes(', ')");
+    let off = number(
+        &mut browser,
+        "const [seconds, error] = chart.querySelector('text.value').textContent.split(', ').map(Number);
+         const curves = mapView.run.variants[0].frames.flatMap(f => [[f[0], f[3]], [f[0], f[5]]]);
+         Math.min(...curves.map(([s, e]) => Math.hypot(s / seconds - 1, e / error - 1)))",
+    );
+    assert!(off < 0.02, "{off}");
+    browser.value("canvas.scrollIntoView(); 0");
+    // a class that is not shown is neither drawn nor selected
+    let names = "document.getElementById('names').textContent.split(picked.class).length - 1";
+    let before = number(&mut browser, names);
+    browser.value(
+        "const tick = [...document.querySelectorAll('#classes label')].find(l => l.textContent === picked.class)
+             .querySelector('input'); tick.click(); 0",
+    );
+    browser.until("canvas.dataset.selected === '' && !mapView.pending");
+    assert!(before > 0.0 && number(&mut browser, names) == 0.0);
+    browser.value("tick.click(); mapView.select(picked.id); 0");
+    browser.until("canvas.dataset.selected === String(picked.id)");
     // an overlay has one view for all variants
     browser.value("document.querySelector('[data-show=overlay]').click(); 0");
     browser.until(
@@ -145,6 +174,27 @@ fn the_map_turns_zooms_and_tells_of_an_object() {
     browser.until("document.getElementById('key').textContent.includes('error of the estimated path')");
     browser.save_screenshot("errors");
     browser.was_quiet();
+}
+
+#[test]
+fn a_printed_report_fits_its_paper() {
+    let folder = folder(&[]);
+    let page = desk(&path(&folder, "desk"));
+    let Some(mut browser) = Browser::open("") else { return };
+    // the width of A4 without its margins
+    browser.show(&page, 720, "dark");
+    browser.until("document.documentElement.dataset.map && canvas.dataset.drawn > 0");
+    browser.call("Emulation.setEmulatedMedia", serde_json::json!({ "media": "print" }));
+    let display = |id: &str| format!("getComputedStyle(document.getElementById('{id}')).display");
+    assert_eq!(browser.value(&display("map")), "none");
+    assert_eq!(browser.value(&display("static-map")), "block");
+    assert!(browser.value("document.documentElement.scrollWidth").as_f64().unwrap() <= 720.0);
+    let cut = "[...document.querySelectorAll('.wide')].filter(w => w.getBoundingClientRect().width > 0
+        && (w.scrollWidth > w.clientWidth + 1 || getComputedStyle(w).overflowY !== 'visible')).length";
+    assert_eq!(browser.value(cut), 0);
+    let paper = browser.value("getComputedStyle(document.documentElement).getPropertyValue('--paper')");
+    assert_eq!(paper, "#ffffff");
+    browser.save_screenshot("printed");
 }
 
 #[test]

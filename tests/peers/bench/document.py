@@ -33,8 +33,8 @@ AUTO = Path(__file__).resolve().parent.parent / "auto_summary.md"
 
 METHODS = """# Benchmarks: every method
 <!-- written by `tests/peers/run --write`; change that, not this -->
-All methods on each problem of the [benchmarks](../benchmarks.md), which say how they were measured: those that reach the best known cost first,
-the fastest first.
+This page has all methods on each problem. The [benchmarks](../benchmarks.md) describe the measurement. In each table, the methods
+that reach the best known cost come first, the fastest at the top.
 """
 
 
@@ -47,7 +47,7 @@ def render(all_measured, stop, machine, solvers, repeat):
         INTRODUCTION.format(**vars(stop), **machine, repeat=repeat),
         "## How fast is the default solver?",
         tables.summary(all_measured, default),
-        "[Every method on every problem](reference/benchmarks-methods.md), with stages and memory.",
+        "The tables of [every method](reference/benchmarks-methods.md) also have the times of the stages and the peak memory.",
         "## How does time grow with size?",
         "Cubes of poses with loop closures. The initial error of each pose does not depend on the size.",
         tables.growth(all_measured, *GROWING[0]),

@@ -2,7 +2,8 @@
 class TimeCursor {
   constructor(moved) {
     this.charts = [...document.querySelectorAll("svg[data-time]")].map(chart => {
-      const [left, right, from, to, top, bottom] = chart.dataset.time.split(" ").map(Number);
+      const panels = chart.dataset.panels.split(";").map(panel => panel.split(" ").map(Number));
+      const [left, top, right, , from, to] = panels[0], bottom = panels.at(-1)[3];
       const line = document.createElementNS(chart.namespaceURI, "line");
       for (const [name, value] of Object.entries({ class: "cursor", y1: top, y2: bottom })) line.setAttribute(name, value);
       chart.append(line);

@@ -5,7 +5,7 @@ class MapView {
     this.canvas = this.find("canvas");
     this.renderer = new Renderer(this.canvas);
     this.take(run);
-    this.state = { frame: 0, selected: null, show: {}, active: this.first() };
+    this.state = { frame: 0, selected: null, show: {}, hidden: new Set(), active: this.first() };
     this.orbit = new Orbit(this.canvas, run.variants[0].up, this.extent, () => this.redraw(), (x, y) => this.tap(x, y), e => this.pressed(e));
     for (const box of document.querySelectorAll("[data-show]")) {
       const set = () => { this.state.show[box.dataset.show] = box.checked; };
@@ -56,13 +56,25 @@ class MapView {
     return this.state.active.map(i => this.run.variants[i]);
   }
 
+  // Returns the objects of a variant whose class is shown.
+  objects(variant) {
+    return variant.objects.filter(o => !this.state.hidden.has(o.class));
+  }
+
+  showClass(name, isShown) {
+    isShown ? this.state.hidden.delete(name) : this.state.hidden.add(name);
+    const { selected } = this.state;
+    if (selected !== null && !this.variants.some(v => this.objects(v).some(o => o.id === selected))) this.state.selected = null;
+    this.redraw();
+  }
+
   select(id) {
     this.state.selected = id;
     this.redraw();
   }
 
   pressed({ key }) {
-    const ids = [...new Set(this.variants.flatMap(v => v.objects.filter(o => o.estimate).map(o => o.id)))];
+    const ids = [...new Set(this.variants.flatMap(v => this.objects(v).filter(o => o.estimate).map(o => o.id)))];
     const next = step => ids.length && this.select(ids[(ids.indexOf(this.state.selected) + step + ids.length + (step < 0 && this.state.selected === null ? 1 : 0)) % ids.length]);
     if (key === "n") next(1);
     else if (key === "p") next(-1);
@@ -99,7 +111,7 @@ class MapView {
     // the field of view, from the matrix: its first numbers are those of the perspective times unit vectors
     const wide = 1 / Math.hypot(m[0], m[4], m[8]), high = 1 / Math.hypot(m[1], m[5], m[9]);
     const direction = add(ahead, add(scaled(right, (2 * (x - left) / width - 1) * wide), scaled(above, (1 - 2 * (y - top) / height) * high)));
-    const hits = this.groups()[i].flatMap(k => this.run.variants[k].objects).filter(o => o.estimate).map(o => [meets(o.estimate, eye, direction), o.id]).sort((a, b) => a[0] - b[0]);
+    const hits = this.groups()[i].flatMap(k => this.objects(this.run.variants[k])).filter(o => o.estimate).map(o => [meets(o.estimate, eye, direction), o.id]).sort((a, b) => a[0] - b[0]);
     this.select(hits.length && hits[0][0] < Infinity ? hits[0][1] : null);
   }
 
@@ -122,7 +134,7 @@ class MapView {
     this.key(style);
     [...this.find("images").children].forEach((canvas, i) => {
       const variant = this.variants[i];
-      if (variant.frames[this.state.frame]) drawImage(canvas, variant, this.state.frame, this.state.selected, style);
+      if (variant.frames[this.state.frame]) drawImage(canvas, variant, this.state, style);
     });
     // a screen reader reads it after a change, and not if only the camera turns
     const { selected, frame, active } = this.state, told = [selected, frame, active].join();
@@ -145,7 +157,7 @@ class MapView {
     const now = frames[frame];
     if (now) segments.frustum(now[4], camera, 1.6 * depth, estimate, 2.5);
     const ellipsoids = [];
-    for (const object of variant.objects) {
+    for (const object of this.objects(variant)) {
       const color = show.error && object.error ? ramp(object.error[0] / this.mostObjectError) : rgb(object.color);
       if (object.estimate && place > 0) segments.rings(object.estimate, show.error ? color : estimate, object.id === selected ? 3 : 1.6);
       else if (object.estimate) ellipsoids.push(...axes(object.estimate).flat(), ...object.estimate.slice(0, 3), ...color, object.id === selected ? 1 : 0);
@@ -176,7 +188,7 @@ class MapView {
     };
     put(group.map(v => v.name).join(", ").slice(0, Math.floor(width / 8)), [left + 10, top + 16], style.text, "title");
     const { eye } = this.orbit, away = o => norm(sub(o.estimate, eye));
-    const mapped = variant.objects.filter(o => o.estimate).sort((a, b) => (b.id === this.state.selected) - (a.id === this.state.selected) || away(a) - away(b));
+    const mapped = this.objects(variant).filter(o => o.estimate).sort((a, b) => (b.id === this.state.selected) - (a.id === this.state.selected) || away(a) - away(b));
     if (this.state.show.names) for (const object of mapped) {
       const at = this.project(object.estimate, part);
       if (at) put(object.class, [at[0] - 3.5 * object.class.length, at[1]], style.text);

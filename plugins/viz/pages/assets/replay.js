@@ -28,6 +28,14 @@ class Replay extends MapView {
       });
       bar.append(button);
     });
+    const colors = new Map(this.run.variants.flatMap(v => v.objects).filter(o => o.estimate || o.truth).map(o => [o.class, o.color]));
+    for (const [name, color] of [...colors].sort()) {
+      const label = element("label"), box = element("input", "", { type: "checkbox", checked: "" }), swatch = element("i");
+      swatch.style.background = color;
+      box.addEventListener("change", () => this.showClass(name, box.checked));
+      label.append(box, swatch, name || "no class");
+      this.find("classes").append(label);
+    }
     this.cursor = new TimeCursor(seconds => this.goToTime(seconds));
     if (this.run.variants.length < 2) this.find("overlay").style.display = "none";
     this.canvas.ariaLabel += " Comma and full stop go from frame to frame, space replays.";
