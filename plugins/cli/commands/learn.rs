@@ -19,7 +19,7 @@ use std::path::PathBuf;
 /// all objects together.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  manifactor run examples/desk/desk.toml --out out/desk\n  manifactor learn out/desk/oriented/map.json --out priors.toml"
+    after_help = "Example:\n  manifactor run examples/desk/desk.toml --out out/desk\n  manifactor learn out/desk/ours/map.json --out priors.toml"
 )]
 pub(crate) struct Learn {
     /// The maps: map.json in the folder of a variant of a run.
@@ -47,7 +47,8 @@ impl Learn {
             ));
         }
         write_whole(&self.out, learned.to_string().as_bytes()).map_err(Failure::at(&self.out))?;
-        let (classes, objects) = (count(learned.classes.len(), "class"), count(learned.pooled.objects, "object"));
+        let (classes, objects) =
+            (count(learned.classes.len(), "class"), count(learned.pooled.objects, "object"));
         let written = format!("{classes} from {objects} written to {}\n", self.out.display());
         output::print(&(table(&learned).text() + &written));
         Ok(Status::Done)
@@ -81,7 +82,8 @@ impl Learn {
 }
 
 fn table(learned: &LearnedPriors) -> Table {
-    let mut table = Table::of_numbers(&["class", "objects", "semi-axes (m)", "spread", "vertical axis", "of"]);
+    let mut table =
+        Table::of_numbers(&["class", "objects", "semi-axes (m)", "spread", "vertical axis", "of"]);
     let pooled = ("all", &learned.pooled);
     let classes = learned.classes.iter().map(|(class, prior)| (class.as_str(), prior));
     for (class, prior) in classes.chain([pooled]) {

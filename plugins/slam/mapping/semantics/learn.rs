@@ -314,7 +314,10 @@ fn overall(table: &BTreeMap<String, [LogNormal; 3]>) -> [LogNormal; 3] {
 impl fmt::Display for LearnedPriors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [classes, maps, objects] = [self.classes.len(), self.maps, self.pooled.objects];
-        writeln!(f, "# Priors of {classes} classes, learned by `manifactor learn` from {objects} objects of {maps} maps.")?;
+        writeln!(
+            f,
+            "# Priors of {classes} classes, learned by `manifactor learn` from {objects} objects of {maps} maps."
+        )?;
         writeln!(f, "# A run reads this file with `semantics = \"FILE\"`.\n")?;
         let mut free = vec![];
         for (class, prior) in &self.classes {
@@ -324,7 +327,9 @@ impl fmt::Display for LearnedPriors {
             let tilt = prior.orientation.tilt_sigma();
             match prior.orientation.orientation(&self.pooled.orientation) {
                 LearnedOrientation::Longest => write_axis(f, &name, "upright", ", axis = \"longest\"", tilt)?,
-                LearnedOrientation::Shortest => write_axis(f, &name, "upright", ", axis = \"shortest\"", tilt)?,
+                LearnedOrientation::Shortest => {
+                    write_axis(f, &name, "upright", ", axis = \"shortest\"", tilt)?
+                }
                 LearnedOrientation::Lying => write_axis(f, &name, "horizontal_orientation_smooth", "", tilt)?,
                 LearnedOrientation::Resting => {}
                 LearnedOrientation::Free => free.push(name),
@@ -350,7 +355,11 @@ impl fmt::Display for LearnedPriors {
         };
         writeln!(f, "# one axis is vertical, whichever it is")?;
         let sigma = number(pooled.resting_sigma());
-        write_rule(f, &of_classes, &format!("factor = {{ type = \"resting\" }}\nnoise = {{ sigma = {sigma} }}"))
+        write_rule(
+            f,
+            &of_classes,
+            &format!("factor = {{ type = \"resting\" }}\nnoise = {{ sigma = {sigma} }}"),
+        )
     }
 }
 
@@ -380,7 +389,10 @@ fn write_axis(f: &mut fmt::Formatter<'_>, name: &str, factor: &str, axis: &str, 
 }
 
 fn write_rule(f: &mut fmt::Formatter<'_>, classes: &str, rule: &str) -> fmt::Result {
-    writeln!(f, "[[semantics]]\n{classes}\n{rule}\nloss = {{ type = \"cauchy\", scale = 1.0 }}\noptional = true\n")
+    writeln!(
+        f,
+        "[[semantics]]\n{classes}\n{rule}\nloss = {{ type = \"cauchy\", scale = 1.0 }}\noptional = true\n"
+    )
 }
 
 /// Returns a string of TOML. JSON escapes the same characters, except for the delete character.
@@ -458,7 +470,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_object_and_an_unknown_class_say_nothing_about_a_class() {
+    fn a_flat_object_has_no_size_and_a_class_without_a_row_is_reported() {
         let flat = PriorObject { flat: true, ..object("cup", [0.2, 0.2, 0.4], 0.0, 1e-6) };
         assert_eq!(learned(vec![flat]).classes["cup"].sizes, household()["cup"]);
         let all = learned(vec![object("gramophone", STANDING, 0.0, 0.1), object("cup", STANDING, 0.0, 0.1)]);
@@ -470,7 +482,8 @@ mod tests {
     #[test]
     fn most_objects_decide_which_axis_is_vertical() {
         let turned = std::f64::consts::FRAC_PI_2;
-        let cups = |axes: [f64; 3], tilts: &[f64]| tilts.iter().map(|t| object("cup", axes, *t, 0.1)).collect();
+        let cups =
+            |axes: [f64; 3], tilts: &[f64]| tilts.iter().map(|t| object("cup", axes, *t, 0.1)).collect();
         assert_eq!(orientation(cups(STANDING, &[0.0; 5])), LearnedOrientation::Longest);
         assert_eq!(orientation(cups(LYING, &[0.05; 5])), LearnedOrientation::Shortest);
         // the middle axis is vertical
@@ -483,7 +496,7 @@ mod tests {
     }
 
     #[test]
-    fn the_spread_of_the_tilt_is_learned_from_its_prior_on() {
+    fn the_spread_of_the_tilt_moves_from_its_prior_to_that_of_the_objects() {
         let sigma = |tilt: f64, n: usize| {
             let all = learned(vec![object("cup", STANDING, tilt, 0.1); n]);
             all.classes["cup"].orientation.tilt_sigma()
@@ -511,8 +524,7 @@ mod tests {
     fn rules(all: &LearnedPriors) -> Vec<SemanticRule> {
         let document = Document::parse("priors.toml", all.to_string(), Format::Toml).unwrap();
         let errors = Errors::new();
-        let read =
-            read_semantics(document.root().field("semantics"), Path::new(""), &Values::new(), &errors);
+        let read = read_semantics(document.root().field("semantics"), Path::new(""), &Values::new(), &errors);
         errors.finish(Some(read)).unwrap_or_else(|e| panic!("{e}\n{all}"))
     }
 
@@ -535,7 +547,8 @@ mod tests {
         assert_eq!(factors(&rules, "umbrella"), ["size_prior"]);
         assert_eq!(factors(&rules, "zebra"), ["size_prior", "resting"]);
         let strange = ClassAliases::default().canonical(strange);
-        assert_eq!(factors(&rules, &strange), ["size_prior", "upright", "resting"]);
+        // one object is not enough for an axis
+        assert_eq!(factors(&rules, &strange), ["size_prior", "resting"]);
     }
 
     #[test]
@@ -544,7 +557,7 @@ mod tests {
         objects.extend(vec![object("bottle", STANDING, 0.0, 0.1); 5]);
         let rules = rules(&learned(objects));
         assert_eq!(factors(&rules, "umbrella"), ["size_prior"]);
-        assert_eq!(factors(&rules, "bottle"), ["size_prior", "resting"]);
+        assert_eq!(factors(&rules, "bottle"), ["size_prior", "upright", "resting"]);
         assert_eq!(factors(&rules, "zebra"), ["size_prior"]);
     }
 

@@ -52,8 +52,7 @@ impl ClassSize {
     /// Returns the rule that states this size. `None` never occurs: the extents are valid semi-axes.
     pub(super) fn rule(self) -> Option<SemanticRule> {
         let semi_axes = SemiAxes::new(self.semi_axes()).ok()?;
-        let factor: Arc<dyn Factor> =
-            Arc::new(SizePrior { semi_axes, order: AxisOrder::Sorted });
+        let factor: Arc<dyn Factor> = Arc::new(SizePrior { semi_axes, order: AxisOrder::Sorted });
         let document = serde_json::to_value(&factor).ok()?;
         Some(SemanticRule {
             noise: Noise::sigma(self.log_sigma()).ok()?,
@@ -113,8 +112,7 @@ mod tests {
     #[test]
     fn the_household_table_has_a_source_and_a_wide_spread_for_each_class() {
         let rows = shipped_sizes("household").unwrap();
-        let mut classes: Vec<&str> =
-            rows.iter().flat_map(|row| &row.classes).map(String::as_str).collect();
+        let mut classes: Vec<&str> = rows.iter().flat_map(|row| &row.classes).map(String::as_str).collect();
         assert!(["cup", "keyboard", "tv monitor", "car"].iter().all(|class| classes.contains(class)));
         let named = classes.len();
         classes.sort_unstable();
