@@ -214,7 +214,7 @@ impl OrientationCounts {
         self.longest + self.shortest + self.other + self.none
     }
 
-    /// Returns the rule that most objects obey. Shares are shrunk towards those of `pooled`, which counts as one
+    /// Returns the rule that most objects obey. Shares are shrunk towards the shares of `pooled`, which counts as one
     /// object.
     pub fn orientation(&self, pooled: &Self) -> LearnedOrientation {
         let share = |of: fn(&Self) -> usize| {

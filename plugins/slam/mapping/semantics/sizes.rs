@@ -18,7 +18,7 @@ number! {
 
 /// Typical size of objects of some classes: extents with a log-normal spread.
 ///
-/// It becomes a rule with the factor `size_prior` and a Cauchy loss. The extents are those of a box around the
+/// It becomes a rule with the factor `size_prior` and a Cauchy loss. `size_m` are the extents of a box around the
 /// object. An ellipsoid that fits the outlines of a box is larger than the box, and the rule takes this into
 /// account.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -36,7 +36,7 @@ pub struct ClassSize {
 }
 
 impl ClassSize {
-    /// Returns the semi-axes of the ellipsoid whose outlines are as wide as those of the box. A box with half
+    /// Returns the semi-axes of the ellipsoid whose outlines are as wide as the outlines of a box. A box with half
     /// extents a reaches Σ aₖ|uₖ| along a direction u, and an ellipsoid √Σ sₖ²uₖ². The mean squares over all
     /// directions are equal for sₖ² = aₖ² + (2/π) aₖ Σ aⱼ, with the sum over the other two extents.
     pub fn semi_axes(&self) -> Vector3<f64> {
