@@ -10,7 +10,7 @@ use manifactor::config::Format;
 use manifactor::formats::whole::{check_writable, write_whole};
 use manifactor::slam::prior_map::PriorMap;
 use manifactor::slam::semantics::learn::{LearnedOrientation, LearnedPriors};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Learn priors from the maps of earlier runs: sizes and orientation of objects, by class.
 ///
@@ -36,7 +36,7 @@ pub(crate) struct Learn {
 impl Learn {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         self.check_out()?;
-        let maps: Vec<PriorMap> = self.maps.iter().map(|map| self.read(map)).collect::<Result<_, _>>()?;
+        let maps: Vec<PriorMap> = self.maps.iter().map(|map| read(map)).collect::<Result<_, _>>()?;
         let learned = LearnedPriors::learn(&maps).map_err(|error| {
             Failure::with_help(error, "give the map.json of a run that maps objects of known classes")
         })?;
@@ -65,20 +65,21 @@ impl Learn {
         }
         check_writable(&self.out).map_err(Failure::at(&self.out))
     }
+}
 
-    fn read(&self, path: &PathBuf) -> Result<PriorMap, Failure> {
-        kind::MAP.refuse_folder(path)?;
-        let map = PriorMap::read(path)?;
-        let path = path.display();
-        if map.objects.is_empty() {
-            output::print_message(&format!("warning: {path} has no objects"));
-        } else if map.up.is_none() {
-            output::print_message(&format!(
-                "warning: {path} has no up direction, so no orientation is learned from it; set `[gravity]` in its run"
-            ));
-        }
-        Ok(map)
+/// Reads a map, and warns if little can be learned from it.
+fn read(path: &Path) -> Result<PriorMap, Failure> {
+    kind::MAP.refuse_folder(path)?;
+    let map = PriorMap::read(path)?;
+    let path = path.display();
+    if map.objects.is_empty() {
+        output::print_message(&format!("warning: {path} has no objects"));
+    } else if map.up.is_none() {
+        output::print_message(&format!(
+            "warning: {path} has no up direction, so no orientation is learned from it; set `[gravity]` in its run"
+        ));
     }
+    Ok(map)
 }
 
 fn table(learned: &LearnedPriors) -> Table {

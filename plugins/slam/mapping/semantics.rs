@@ -43,7 +43,7 @@ pub use condition::NearCondition;
 pub use read::{RulesDocument, SemanticsDocument, SizesDocument};
 pub(crate) use read::{read_semantics, read_sizes};
 pub use rule_factor::{RuleError, RuleFactor};
-pub use sizes::ClassSize;
+pub use sizes::{ClassSize, Extent, Spread};
 
 /// The paper's Table I.
 const TABLE_ONE: &str = include_str!("semantics/table_one.toml");

@@ -116,7 +116,7 @@ impl LearnedPriors {
     /// # Errors
     /// If no object has a class.
     pub fn learn(maps: &[PriorMap]) -> Result<Self, NothingToLearn> {
-        let objects = || maps.iter().flat_map(|map| map.objects.iter().map(|object| (object, map.up)));
+        let objects = || maps.iter().flat_map(|map| map.objects.iter().map(move |object| (object, map.up)));
         let learned = objects().filter_map(|(object, up)| LearnedObject::new(object, up));
         let mut by_class: BTreeMap<String, Vec<LearnedObject>> = BTreeMap::new();
         for object in learned {
@@ -251,7 +251,7 @@ impl ClassPrior {
     fn new(objects: &[&LearnedObject], prior: [LogNormal; 3], household: bool) -> Self {
         let size = |rank: usize| {
             let seen = objects.iter().map(|object| (object.log_axes[rank], object.variances[rank]));
-            prior[rank].updated(seen.collect())
+            prior[rank].updated(&seen.collect::<Vec<_>>())
         };
         let orientations = objects.iter().filter_map(|object| object.orientation);
         Self {
@@ -271,7 +271,7 @@ impl ClassPrior {
 impl LogNormal {
     /// Returns the distribution after measurements of objects, each with its variance. An object counts as
     /// much as its measurement is precise in comparison with the spread of the class.
-    fn updated(self, objects: Vec<(f64, f64)>) -> Self {
+    fn updated(self, objects: &[(f64, f64)]) -> Self {
         let spread = self.sigma * self.sigma;
         let weight = |variance: f64| spread / (spread + variance);
         let count: f64 = objects.iter().map(|(_, variance)| weight(*variance)).sum();

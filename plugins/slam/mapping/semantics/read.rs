@@ -99,7 +99,8 @@ pub(super) fn shipped_sizes(name: &str) -> Result<Vec<ClassSize>, Diagnostics> {
     let document = Document::parse(format!("{name}.toml"), text, Format::Toml)?;
     let errors = Errors::new();
     let rows = (SIZES.file)(document.root(), &errors);
-    errors.finish(rows.map(|rows| rows.iter().filter_map(|row| row.read(&errors)).collect()))
+    let rows = rows.map(|rows| rows.iter().filter_map(|row| row.read(&errors)).collect());
+    errors.finish(rows)
 }
 
 impl RuleList {
@@ -159,7 +160,8 @@ impl RuleList {
     fn read_file(&self, document: &Document, own: &Values) -> Result<Vec<SemanticRule>, Diagnostics> {
         let errors = Errors::new();
         let list = (self.file)(document.root(), &errors);
-        errors.finish(list.map(|list| (self.entries)(&list, own, &errors)))
+        let rules = list.map(|list| (self.entries)(&list, own, &errors));
+        errors.finish(rules)
     }
 }
 
