@@ -49,7 +49,7 @@ impl Learn {
         write_whole(&self.out, learned.to_string().as_bytes()).map_err(Failure::at(&self.out))?;
         let (classes, objects) =
             (count(learned.classes.len(), "class"), count(learned.pooled.objects, "object"));
-        let written = format!("{classes} from {objects} written to {}\n", self.out.display());
+        let written = format!("\n{classes} from {objects} written to {}\n", self.out.display());
         output::print(&(table(&learned).text() + &written));
         Ok(Status::Done)
     }

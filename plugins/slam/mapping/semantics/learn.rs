@@ -7,6 +7,7 @@
 use super::ClassSize;
 use super::read::shipped_sizes;
 use manifactor_config::nearest;
+use manifactor_formats::words::count;
 use manifactor_graph::{Direction, Residual, Up};
 use manifactor_recording::class::ClassAliases;
 use manifactor_recording::prior_map::{PriorMap, PriorObject};
@@ -313,11 +314,9 @@ fn overall(table: &BTreeMap<String, [LogNormal; 3]>) -> [LogNormal; 3] {
 /// Writes a file of semantic rules.
 impl fmt::Display for LearnedPriors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [classes, maps, objects] = [self.classes.len(), self.maps, self.pooled.objects];
-        writeln!(
-            f,
-            "# Priors of {classes} classes, learned by `manifactor learn` from {objects} objects of {maps} maps."
-        )?;
+        let classes = count(self.classes.len(), "class");
+        let (maps, objects) = (count(self.maps, "map"), count(self.pooled.objects, "object"));
+        writeln!(f, "# Priors of {classes}, learned by `manifactor learn` from {objects} of {maps}.")?;
         writeln!(f, "# A run reads this file with `semantics = \"FILE\"`.\n")?;
         let mut free = vec![];
         for (class, prior) in &self.classes {
@@ -366,9 +365,9 @@ impl fmt::Display for LearnedPriors {
 impl ClassPrior {
     fn counts(&self) -> String {
         let OrientationCounts { longest, shortest, other, none, lying, .. } = self.orientation;
-        let objects = self.objects;
+        let objects = count(self.objects, "object");
         format!(
-            "{objects} objects; vertical axis: longest {longest}, shortest {shortest}, other {other}, none {none}; longest axis horizontal: {lying}"
+            "{objects}; vertical axis: longest {longest}, shortest {shortest}, other {other}, none {none}; longest axis horizontal: {lying}"
         )
     }
 
