@@ -1,12 +1,12 @@
 //! `manifactor learn`: learns semantic rules from maps.
 use crate::failure::Failure;
 use crate::input::destination::refuse_to_replace;
-use crate::input::kind;
+use crate::input::kind::{self, InputKind};
 use crate::output;
 use crate::output::text::{Table, count};
 use crate::status::Status;
 use clap::Args;
-use manifactor::config::Format;
+use manifactor::config::{Document, Format};
 use manifactor::formats::whole::{check_writable, write_whole};
 use manifactor::slam::prior_map::PriorMap;
 use manifactor::slam::semantics::learn::{LearnedOrientation, LearnedPriors};
@@ -70,6 +70,9 @@ impl Learn {
 /// Reads a map, and warns if little can be learned from it.
 fn read(path: &Path) -> Result<PriorMap, Failure> {
     kind::MAP.refuse_folder(path)?;
+    if let Ok(document) = Document::open(path) {
+        kind::MAP.check(path, InputKind::of_document(&document))?;
+    }
     let map = PriorMap::read(path)?;
     let path = path.display();
     if map.objects.is_empty() {

@@ -73,7 +73,7 @@ fn maps_that_teach_nothing_are_named() {
     learn("new.json").ended(2).complains("a map of version 7, and this program reads version 1");
     learn("broken.json").ended(2).complains("broken.json");
     learn("nowhere.json").ended(3).complains("nowhere.json");
-    learn("desk.toml").ended(2);
+    learn("desk.toml").ended(2).complains("is the document of a run; expected the map of a run");
     learn("").ended(3).complains("expected the map of a run");
     assert!(!folder.path().join("priors.toml").exists());
 }

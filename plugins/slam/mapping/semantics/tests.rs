@@ -237,7 +237,7 @@ fn the_household_table_gives_no_warning_about_classes_without_objects() {
 fn wrong_sizes_are_refused_at_their_place() {
     let refused = |row: &str| read(&format!("sizes = [\n{{ {row} }}]")).unwrap_err();
     for (row, expected) in [
-        ("classes = ['cup'], size_m = [0.1, -0.2, 0.3], spread = 1.5", "rules.toml:2:36: expected a length"),
+        ("classes = ['cup'], size_m = [0.1, -0.2, 0.3], spread = 1.5", "rules.toml:2:37: expected a length"),
         ("classes = ['cup'], size_m = [0.1, 0.2], spread = 1.5", "rules.toml:2:"),
         ("classes = ['cup'], size_m = [0.1, 0.2, 0.3], spread = 0.5", "expected a factor above 1"),
         ("classes = ['cup'], size_m = [0.1, 0.2, 0.3]", "missing field `spread`"),
