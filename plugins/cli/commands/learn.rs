@@ -43,7 +43,7 @@ impl Learn {
         for (class, similar) in learned.unknown_classes() {
             let similar = similar.map_or(String::new(), |name| format!("; is it `{name}`?"));
             output::print_note(&format!(
-                "`household` has no size of `{class}`, so the prior of all objects replaces it{similar}"
+                "`household` has no size of `{class}`, so its prior is shrunk towards all objects{similar}"
             ));
         }
         write_whole(&self.out, learned.to_string().as_bytes()).map_err(Failure::at(&self.out))?;
