@@ -1,7 +1,7 @@
 //! The command line.
 use crate::commands::{
-    Check, CheckFactor, CheckManifold, Completions, Evaluate, Experiment, Explain, List, Man, New, Online,
-    Plot, Replay, Run, Schema, ShowGraph, Simulate, Solve,
+    Check, CheckFactor, CheckManifold, Completions, Evaluate, Experiment, Explain, Learn, List, Man, New,
+    Online, Plot, Replay, Run, Schema, ShowGraph, Simulate, Solve,
 };
 use crate::failure::Failure;
 use crate::output::text::count;
@@ -54,6 +54,7 @@ enum Command {
     Graph(ShowGraph),
     New(New),
     Evaluate(Evaluate),
+    Learn(Learn),
     Simulate(Simulate),
     Schema(Schema),
     Completions(Completions),
@@ -91,6 +92,7 @@ impl Cli {
             Command::Graph(command) => command.run(),
             Command::New(command) => command.run(),
             Command::Evaluate(command) => command.run(),
+            Command::Learn(command) => command.run(),
             Command::Simulate(command) => command.run(),
             Command::Schema(command) => command.run(),
             Command::Completions(command) => Ok(command.run(Self::command())),
@@ -135,7 +137,8 @@ impl Cli {
             Command::Explain(command) => command.json,
             Command::Graph(command) => command.json,
             Command::Evaluate(command) => command.json,
-            Command::New(_)
+            Command::Learn(_)
+            | Command::New(_)
             | Command::Plot(_)
             | Command::Simulate(_)
             | Command::Completions(_)

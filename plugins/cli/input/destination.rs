@@ -27,7 +27,7 @@ impl Destination {
             return Err(no_format(path));
         }
         if !self.force {
-            refuse_to_replace(path, input)?;
+            refuse_to_replace(path, input, "is the input graph, and its comments would be lost")?;
         }
         check_writable(path).map_err(Failure::at(path))
     }
@@ -52,16 +52,15 @@ impl Destination {
     }
 }
 
-/// Returns an error if a file would be lost.
-fn refuse_to_replace(path: &Path, input: &Path) -> Result<(), Failure> {
+/// Returns an error if a file would be lost. `is_input` says so of the input itself.
+pub(crate) fn refuse_to_replace(path: &Path, input: &Path, is_input: &str) -> Result<(), Failure> {
     let is_stream = path.metadata().is_ok_and(|at| !at.is_file() && !at.is_dir());
     // a dangling symbolic link counts as existing too
     if is_stream || path.symlink_metadata().is_err() {
         return Ok(());
     }
-    let is_input =
-        path.canonicalize().is_ok_and(|there| input.canonicalize().is_ok_and(|graph| graph == there));
-    let what = if is_input { "is the input graph, and its comments would be lost" } else { "exists already" };
+    let same = path.canonicalize().is_ok_and(|there| input.canonicalize().is_ok_and(|file| file == there));
+    let what = if same { is_input } else { "exists already" };
     Err(Failure::with_help(
         format!("{} {what}", path.display()),
         "choose another name, or overwrite it with --force",

@@ -173,6 +173,8 @@ pub(crate) const TRAJECTORY: Expected =
 /// Input of `evaluate --boxes`.
 pub(crate) const DETECTIONS: Expected =
     Expected { name: "a table of detections (CSV)", kinds: &[InputKind::Detections] };
+/// Input of `learn`.
+pub(crate) const MAP: Expected = Expected { name: "the map of a run, map.json", kinds: &[] };
 /// Input of `plot`.
 pub(crate) const RUN_FOLDER: Expected =
     Expected { name: "the folder of a run, with record.json", kinds: &[InputKind::RunFolder] };

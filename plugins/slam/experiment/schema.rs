@@ -1,7 +1,7 @@
 //! JSON Schema of a run for completion and checks in editors, generated from the types that read it.
 use crate::document::ExperimentDocument;
 use manifactor_config::{Definitions, graph_root};
-use manifactor_mapping::semantics::{RulesDocument, SemanticsDocument};
+use manifactor_mapping::semantics::{RulesDocument, SemanticsDocument, SizesDocument};
 use manifactor_mapping::settings::RunSettings;
 use manifactor_mapping::settings::run_document::RunHeader;
 use serde_json::{Value, json};
@@ -12,9 +12,15 @@ pub fn run_root(definitions: &mut Definitions) -> Value {
     let mut root = definitions.of::<RunSettings>();
     let mut header = definitions.of::<RunHeader>();
     let mut literal = graph_root(definitions);
-    let mut own = json!({ "semantics": definitions.of::<SemanticsDocument>() });
+    let mut own = json!({
+        "semantics": definitions.of::<SemanticsDocument>(),
+        "sizes": definitions.of::<SizesDocument>(),
+    });
     own["semantics"]["description"] =
         json!("Rules that give factors to objects: a list of rules, the name of a shipped table, or a file.");
+    own["sizes"]["description"] = json!(
+        "Typical sizes of classes, as priors: a list of sizes, the name of a shipped table, or a file."
+    );
     for field in ["variables", "factors"] {
         own[field] = literal["properties"][field].take();
     }

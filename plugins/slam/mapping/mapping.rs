@@ -219,7 +219,7 @@ impl Mapping {
         let mut seen: Vec<String> = classes.collect();
         seen.sort();
         seen.dedup();
-        for rule in settings.semantics.iter().filter(|rule| !rule.shipped) {
+        for rule in settings.semantics.iter().filter(|rule| !rule.optional) {
             for class in unmatched(rule, &seen, &settings.aliases) {
                 let (class, factor) = (class.to_owned(), rule.factor.factor_type().to_owned());
                 self.warnings.push(Warning::ClassWithoutObjects { class, factor, seen: seen.clone() });

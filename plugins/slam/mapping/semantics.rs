@@ -30,23 +30,29 @@ use std::sync::Arc;
 
 mod apply;
 mod condition;
+pub mod learn;
 mod read;
 mod rule_factor;
+mod sizes;
 #[cfg(test)]
 mod tests;
 
 pub use apply::{AppliedRule, RuleCandidate, SkippedRule};
 pub(crate) use apply::{ConnectedKeys, RuleEvaluator, RuleVerdict};
 pub use condition::NearCondition;
-pub(crate) use read::read_semantics;
-pub use read::{RulesDocument, SemanticsDocument};
+pub use read::{RulesDocument, SemanticsDocument, SizesDocument};
+pub(crate) use read::{read_semantics, read_sizes};
 pub use rule_factor::{RuleError, RuleFactor};
+pub use sizes::{ClassSize, Extent, Spread};
 
 /// The paper's Table I.
 const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
 
 /// All objects rest on one of their sides, and have similar semi-axes.
 const RESTING: &str = include_str!("semantics/resting.toml");
+
+/// Typical sizes of COCO's indoor classes and of cars.
+const HOUSEHOLD: &str = include_str!("semantics/household.toml");
 
 /// Name that matches all classes.
 const ANY_CLASS: &str = "*";
@@ -62,6 +68,9 @@ const MIXTURE_SIGMAS: f64 = 3.0;
 pub struct SemanticRule {
     /// Class names, in the spelling of any detector; `*` for all classes.
     pub classes: Vec<String>,
+    /// Class names that `*` leaves out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub except: Vec<String>,
     /// Smallest score of the object's class, averaged over its detections.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min_score: Option<Share>,
@@ -92,9 +101,10 @@ pub struct SemanticRule {
     /// Robust loss of the factor. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub loss: Option<Arc<dyn Loss>>,
-    /// True for a rule of a shipped table, which names more classes than one scene contains.
-    #[serde(skip)]
-    pub shipped: bool,
+    /// Gives no warning if no object is of these classes, as in a table that names more classes than one scene
+    /// contains.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub optional: bool,
 }
 
 /// Returns whether a list of classes contains this one, a name from [`ClassAliases::canonical`].
@@ -110,7 +120,7 @@ impl SemanticRule {
 
     /// Returns whether objects of a class, a name from [`ClassAliases::canonical`], get this factor.
     pub fn applies(&self, class: &str, aliases: &ClassAliases) -> bool {
-        contains_class(&self.classes, class, aliases)
+        contains_class(&self.classes, class, aliases) && !contains_class(&self.except, class, aliases)
     }
 
     /// Returns the probability that the factor holds for an object of that class: 1, or in a mixture the
@@ -160,13 +170,15 @@ impl SemanticRule {
 
 /// Names and texts of the shipped files of rules.
 const SHIPPED_RULES: [(&str, &str); 2] = [("resting", RESTING), ("table_one", TABLE_ONE)];
+/// Names and texts of the shipped tables of sizes.
+const SHIPPED_SIZES: [(&str, &str); 1] = [("household", HOUSEHOLD)];
 
 /// Returns the rules of the paper's Table I.
 ///
 /// # Errors
 /// If the factors in it are not linked.
 pub fn table_one() -> Result<Vec<SemanticRule>, manifactor_config::Diagnostics> {
-    read::shipped_rules("table_one", TABLE_ONE)
+    read::shipped_rules("table_one")
 }
 
 /// Adds the `shape_prior` of the rules `resting`, unless a rule has one.
@@ -174,7 +186,7 @@ pub(crate) fn add_shape_prior(rules: &mut Vec<SemanticRule>) {
     let is_shape_prior = |rule: &SemanticRule| rule.factor.factor_type() == "shape_prior";
     if !rules.iter().any(is_shape_prior) {
         // cannot fail: this crate links the factors
-        let shipped = read::shipped_rules("resting", RESTING).unwrap_or_default();
+        let shipped = read::shipped_rules("resting").unwrap_or_default();
         rules.extend(shipped.into_iter().filter(is_shape_prior));
     }
 }

@@ -1,7 +1,7 @@
 //! The settings of a run: how a sequence becomes a graph, and how the graph is solved.
 use crate::gravity::{Gravity, SourceGravity};
 use crate::motion::{MotionModel, OdometryMotion};
-use crate::semantics::{RuleError, SemanticRule, add_shape_prior, read_semantics};
+use crate::semantics::{RuleError, SemanticRule, add_shape_prior, read_semantics, read_sizes};
 use manifactor_association::{Association, GivenAssociation};
 use manifactor_config::{Diagnostics, Errors, Fault, Node, Section};
 use manifactor_recording::class::ClassAliases;
@@ -70,7 +70,7 @@ pub struct RunSettings {
     /// Up direction of the world.
     #[serde(default = "from_source")]
     pub gravity: Arc<dyn Gravity>,
-    /// Rules that assign factors to objects.
+    /// Rules that assign factors to objects, followed by those of `sizes`.
     #[serde(skip_deserializing)]
     pub semantics: Vec<SemanticRule>,
     /// Variables and factors that the document declares itself.
@@ -141,7 +141,9 @@ impl RunSettings {
         let errors = Errors::new();
         let settings = Section::new(node, &errors).and_then(|mut section| {
             let own = OwnGraph::read_section(&mut section);
-            let semantics = read_semantics(section.optional_node("semantics"), folder, &own.values, &errors);
+            let semantics = section.optional_node("semantics");
+            let mut semantics = read_semantics(semantics, folder, &own.values, &errors);
+            semantics.extend(read_sizes(section.optional_node("sizes"), folder, &errors));
             let mut settings = Self { semantics, own, ..section.rest()? };
             if let Some(prior) = &mut settings.prior_map {
                 prior.read(folder, &settings.aliases, node, &errors)?;

@@ -53,18 +53,25 @@ impl RuleFactor {
     fn read(node: &Node) -> Result<Self, ReadError> {
         let factor: Arc<dyn Factor> = node.try_read::<Box<dyn Factor>>()?.into();
         let name = factor.typetag_name();
-        let signature = factor.erased().signature();
-        let variables = signature.variables;
-        if signature.many || !variables.contains(&TypeId::of::<DualQuadric>()) {
+        let many = factor.erased().signature().many;
+        // the parser has already refused non-finite numbers
+        let document = node.to_json().unwrap_or_default();
+        let read = Self::new(factor, document);
+        let variables = &read.variables;
+        if many || !variables.contains(&TypeId::of::<DualQuadric>()) {
             let names: Vec<_> = variables.iter().map(|id| manifold_name(*id)).collect();
             let message = format!("`{name}` connects {}", names.join(" and "));
             let help = "a semantic rule adds a factor of one dual_quadric, such as `vertical_orientation`, or of several, such \
                         as `beside`";
             return Err(ReadError::new(node.place.clone(), Fault::with_help(message, help)));
         }
-        // the parser has already refused non-finite numbers
-        let document = node.to_json().unwrap_or_default();
-        Ok(Self { document, factor, variables, rows: signature.rows })
+        Ok(read)
+    }
+
+    /// Wraps a factor of objects, with the form that a document has of it.
+    pub(super) fn new(factor: Arc<dyn Factor>, document: Value) -> Self {
+        let signature = factor.erased().signature();
+        Self { document, factor, variables: signature.variables, rows: signature.rows }
     }
 
     /// Returns the type of the factor.

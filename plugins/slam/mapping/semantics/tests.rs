@@ -55,7 +55,10 @@ fn read(text: &str) -> Result<Vec<SemanticRule>, String> {
     let errors = Errors::new();
     let read = document.section(&errors).map(|mut section| {
         let (_, own) = manifactor_config::read_graph_section(&mut section);
-        read_semantics(section.optional_node("semantics"), std::path::Path::new(""), &own, &errors)
+        let folder = std::path::Path::new("");
+        let mut rules = read_semantics(section.optional_node("semantics"), folder, &own, &errors);
+        rules.extend(read_sizes(section.optional_node("sizes"), folder, &errors));
+        rules
     });
     errors.finish(read).map_err(|e| e.to_string())
 }
@@ -199,4 +202,53 @@ fn a_rule_that_cannot_be_applied_says_why_and_where() {
     assert!(noise.contains("rules.toml:5:9"), "{noise}");
     let score = refused("classes = ['cup']\nmin_score = 5.0\nfactor = { type = 'upright' }");
     assert!(score.contains("a number from 0 to 1"), "{score}");
+}
+
+#[test]
+fn a_class_that_a_star_leaves_out_has_no_factor() {
+    let rule = "classes = ['*']\nexcept = ['Cup']\nfactor = { type = 'vertical_orientation' }";
+    let found = judged(rule, &[object(1, "cup", 0.8, 0.0), object(2, "bowl", 0.8, 1.0)]);
+    assert_eq!(found.iter().map(|v| v.entries.len()).collect::<Vec<_>>(), [0, 1]);
+    assert!(found[0].left_out.is_empty());
+}
+
+#[test]
+fn a_size_is_a_rule_with_a_size_prior() {
+    let rules = read("sizes = [{ classes = ['cup'], size_m = [0.1, 0.2, 0.3], spread = 2.0 }]").unwrap();
+    assert_eq!(rules.len(), 1);
+    assert!(rules[0].applies("cup", &ClassAliases::default()) && !rules[0].optional);
+    assert_eq!(rules[0].noise, Noise::sigma(2.0f64.ln()).unwrap());
+    let entry = rules[0].entry(vec!["q1".into()], None, 1.0).unwrap();
+    let text = serde_json::to_string(&entry.factor).unwrap();
+    assert!(text.starts_with(r#"{"type":"size_prior","semi_axes":[0.0"#), "{text}");
+    let written = serde_json::to_value(&rules[0]).unwrap();
+    assert_eq!(written["factor"]["type"], "size_prior");
+}
+
+#[test]
+fn the_household_table_gives_no_warning_about_classes_without_objects() {
+    let rules = read("sizes = 'household'").unwrap();
+    assert!(rules.len() > 30 && rules.iter().all(|rule| rule.optional));
+    let of = |class: &str| rules.iter().filter(|rule| rule.applies(class, &ClassAliases::default())).count();
+    assert_eq!([of("cup"), of("tv monitor"), of("zebra")], [1, 1, 0]);
+}
+
+#[test]
+fn wrong_sizes_are_refused_at_their_place() {
+    let refused = |row: &str| read(&format!("sizes = [\n{{ {row} }}]")).unwrap_err();
+    for (row, expected) in [
+        ("classes = ['cup'], size_m = [0.1, -0.2, 0.3], spread = 1.5", "rules.toml:2:37: expected a length"),
+        ("classes = ['cup'], size_m = [0.1, 0.2], spread = 1.5", "rules.toml:2:"),
+        ("classes = ['cup'], size_m = [0.1, 0.2, 0.3], spread = 0.5", "expected a factor above 1"),
+        ("classes = ['cup'], size_m = [0.1, 0.2, 0.3]", "missing field `spread`"),
+        ("classes = ['cup'], size = [0.1, 0.2, 0.3], spread = 1.5", "unknown field `size`"),
+        ("size_m = [0.1, 0.2, 0.3], spread = 1.5", "missing field `classes`"),
+    ] {
+        let told = refused(row);
+        assert!(told.contains(expected), "{row}: {told}");
+    }
+    let unknown = read("sizes = 'houshold'").unwrap_err();
+    assert!(unknown.contains("unknown sizes `houshold`"), "{unknown}");
+    assert!(read("sizes = 3").unwrap_err().contains("an array of sizes"));
+    assert!(read("sizes = 'nowhere.toml'").unwrap_err().contains("nowhere.toml"));
 }

@@ -23,6 +23,17 @@ pub struct HeldOutReport {
     pub all: Prediction,
     /// Results by class.
     pub classes: BTreeMap<String, Prediction>,
+    /// Results by object, for paired comparisons of runs with the same holdout.
+    pub objects: BTreeMap<ObjectId, ObjectPrediction>,
+}
+
+/// Predicted boxes of one object.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ObjectPrediction {
+    /// Number of boxes.
+    pub boxes: usize,
+    /// Mean intersection over union; 0 if the object is not in the map.
+    pub iou: f64,
 }
 
 /// Predicted boxes, compared with detected boxes.
@@ -81,8 +92,15 @@ impl HeldOutReport {
         }
         let of_class = |places: Vec<usize>| Prediction::of(places.iter().filter_map(|i| all.get(*i)));
         let classes = classes.into_iter().map(|(class, places)| (class, of_class(places))).collect();
+        let mut objects: BTreeMap<ObjectId, ObjectPrediction> = BTreeMap::new();
+        for predicted in all.iter().chain(&unmapped) {
+            let ObjectPrediction { boxes, iou } = objects.entry(predicted.object).or_default();
+            *boxes += 1;
+            *iou += (predicted.iou - *iou) / *boxes as f64;
+        }
         Some(Self {
             holdout,
+            objects,
             unmapped: unmapped.len(),
             iou_unmapped_as_zero: Prediction::of(all.iter().chain(&unmapped)).iou,
             all: Prediction::of(all.iter()),
