@@ -1,6 +1,6 @@
 //! The page of a run: the map in 3D, its variants side by side, and the factors of each object.
-use super::run_tables::{held_out, noise, objects, overview, own_variables, words};
 use super::page::{Page, VALUES};
+use super::run_tables::{held_out, noise, objects, overview, own_variables, words};
 use super::{verdict::verdict, viewer};
 use crate::drawing::{Palette, Picture, Scene, Viewpoint, map};
 use crate::run::{RESIDUALS, cost, images, maps_and_charts, residual_row};
