@@ -59,6 +59,12 @@ fn floor(objects: impl IntoIterator<Item = ([f64; 2], &'static str)>) -> PriorMa
     PriorMap::new(Some(Direction::Z), all.collect())
 }
 
+/// Six bottles in a regular hexagon.
+fn ring() -> PriorMap {
+    let angle = |i: u32| f64::from(i) * std::f64::consts::FRAC_PI_3;
+    floor((0..6).map(|i| ([angle(i).cos(), angle(i).sin()], "bottle")))
+}
+
 /// Irregular places on a floor.
 fn scattered(n: u32) -> impl Iterator<Item = [f64; 2]> {
     let part = |i: u32, step: f64| (f64::from(i + 1) * step).fract();
@@ -84,9 +90,7 @@ fn a_layout_is_found_again_with_and_without_up() {
 
 #[test]
 fn what_looks_the_same_from_two_sides_is_nowhere() {
-    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-    let bottles = square.iter().zip(10..).map(|([x, y], id)| object(id, "bottle", Vector3::new(*x, *y, 0.0)));
-    let map = PriorMap::new(Some(Direction::Z), bottles.collect());
+    let map = ring();
     let (marks, up) = local_objects(&map, &any_other_pose(), 0);
     assert!(Layout::new(marks, up, &map, false).align(|_| AGREES).is_none());
     // ids resolve the symmetry
@@ -98,8 +102,7 @@ fn what_looks_the_same_from_two_sides_is_nowhere() {
 
 #[test]
 fn a_place_is_one_where_boxes_agree_with_it() {
-    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-    let map = floor(square.map(|place| (place, "bottle")));
+    let map = ring();
     let (marks, up) = local_objects(&map, &any_other_pose(), 0);
     let layout = Layout::new(marks, up, &map, false);
     let is_right =
@@ -116,7 +119,7 @@ fn a_place_is_one_where_boxes_agree_with_it() {
 #[test]
 fn too_few_objects_or_others_are_nowhere() {
     let map = table(&CLASSES, Some(Direction::Z));
-    let (marks, up) = local_objects(&map, &any_other_pose(), 5);
+    let (marks, up) = local_objects(&map, &any_other_pose(), 4);
     assert!(Layout::new(marks, up, &map, false).align(|_| AGREES).is_none());
     let (marks, up) = local_objects(&table(&["laptop"], map.up), &any_other_pose(), 0);
     assert!(Layout::new(marks, up, &map, false).align(|_| AGREES).is_none());
