@@ -91,8 +91,8 @@ pub(super) fn gone_objects(estimate: &Estimate, settings: &RunSettings) -> Vec<O
     all.into_iter().filter_map(is_gone).collect()
 }
 
-/// Returns whether an object is gone. It should have been detected again since its last detection in this run
-/// or before, but was not. Or its few detections in this run show other objects, and it was moved before.
+/// Returns whether an object is gone: since its last detection in this run it should have been detected again,
+/// but was not. Or it was moved before this run, and its few detections, if any, show other objects.
 fn is_gone(
     measured: &ObjectMeasurements,
     opportunities: DetectionOpportunities,
