@@ -101,6 +101,9 @@ const MIN_LEAD_NATS: f64 = 9.2;
 /// Factor on the standard deviations of the pose, because the errors of the objects of a run are correlated: on
 /// fr1, with 10 to 20 matches, poses are off by 2° and 5 cm (median).
 const POSE_SIGMA_SCALE: f64 = 2.0;
+/// Required overlap of the boxes of matched objects with the projections of the prior ellipsoids. Right poses on
+/// fr1 have 0.5 or more. It rejects a place where centres fit, and sizes do not.
+const MIN_OVERLAP: f64 = 0.45;
 /// Smallest spread of the known marks along an axis, in metres. It keeps the volume of a map in a plane
 /// positive.
 const MIN_SPREAD_M: f64 = 0.05;
@@ -216,7 +219,9 @@ impl Layout {
         best.lead -= second;
         let AlignedLayout { lead, matches, .. } = &best;
         tracing::debug!(lead, matches = matches.len(), ?agreement, "a place in the prior map");
-        (matches.len() >= MIN_MATCHES && *lead >= MIN_LEAD_NATS).then_some((best, agreement))
+        let is_clear =
+            matches.len() >= MIN_MATCHES && *lead >= MIN_LEAD_NATS && agreement.overlap >= MIN_OVERLAP;
+        is_clear.then_some((best, agreement))
     }
 
     /// Returns candidate poses with scores and matches, the best first.

@@ -110,6 +110,11 @@ fn a_place_is_one_where_boxes_agree_with_it() {
     let missed = |missed: f64| Agreement { missed, ..AGREES };
     let found = layout.align(|aligned| if is_right(aligned) { AGREES } else { missed(-40.0) }).unwrap().0;
     assert!(is_right(&found), "{found:?}");
+    let mismatched = |aligned: &AlignedLayout| Agreement {
+        overlap: 0.3,
+        ..missed(if is_right(aligned) { 0.0 } else { -40.0 })
+    };
+    assert!(layout.align(mismatched).is_none());
     // one missed object is not enough to exclude the other poses
     assert!(layout.align(|aligned| if is_right(aligned) { AGREES } else { missed(-1.6) }).is_none());
     // objects are missing at each pose
