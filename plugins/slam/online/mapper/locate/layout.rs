@@ -93,7 +93,7 @@ const MATCHING_ROUNDS: usize = 5;
 /// Two poses count as one if each mark moves by less than this, in units of twice its σ.
 const SAME_POSE_SIGMA: f64 = 3.0;
 /// Required number of matches. Four objects that stand nearly in a plane have nearly the same layout in a mirror:
-/// with four, two of twenty mirrored streams of fr1 are accepted.
+/// with four, 8 of 16 mirrored streams of fr1 are accepted.
 const MIN_MATCHES: usize = 5;
 /// Required lead over the second best explanation, in nats: at most one in 10,000 places is wrong, if the
 /// model holds.
