@@ -43,6 +43,8 @@ fn sums<'de, D: Deserializer<'de>>(from: D) -> Result<IndexMap<String, f64>, D::
     }
 }
 
+/// Smallest similarity of the classes of one object in two runs.
+const MIN_CLASS_SIMILARITY: f64 = 0.3;
 /// Classes with a smaller share of the sum of all scores are not listed.
 const LEAST_SHARE: f64 = 0.01;
 
@@ -79,6 +81,29 @@ impl ClassFusion {
         for (class, sum) in other.sums {
             *self.sums.entry(class).or_default() += sum;
         }
+    }
+
+    /// Returns the number of detections.
+    pub fn detections(&self) -> usize {
+        self.detections
+    }
+
+    /// Returns whether no detection had a class.
+    pub fn is_nameless(&self) -> bool {
+        self.sums.is_empty()
+    }
+
+    /// Returns the share of a class in the sum of all scores.
+    pub fn share(&self, class: &str) -> f64 {
+        self.shares().find(|(name, _)| *name == class).map_or(0.0, |(_, share)| share)
+    }
+
+    /// Returns whether two objects may be the same one by their classes: the Bhattacharyya coefficient is at
+    /// least 0.3. An object without a class may be any object.
+    pub fn is_compatible(&self, other: &Self) -> bool {
+        let similarity =
+            || self.shares().map(|(class, share)| (share * other.share(class)).sqrt()).sum::<f64>();
+        self.is_nameless() || other.is_nameless() || similarity() >= MIN_CLASS_SIMILARITY
     }
 
     /// Returns the scores under the canonical names of `aliases`; scores of synonyms are added up.

@@ -68,6 +68,10 @@ pub struct DetectionCounts {
     pub seen: usize,
 }
 
+/// Number of opportunities that the detection rate of one run counts for in another run. It is small, because
+/// the rate depends on the sides from which an object is seen, and these differ between runs.
+const RATE_STRENGTH: f64 = 4.0;
+
 /// The only version so far.
 const VERSION: u32 = 1;
 
@@ -175,6 +179,17 @@ impl DetectionCounts {
         (self.seen + 1) as f64 / (self.expected + 2) as f64
     }
 
+    /// Returns the log-likelihood of the detections of a second run, up to the number of their orders, if the
+    /// object is present in both. The rate of the second run has a beta distribution with the mean of this
+    /// rate.
+    pub fn log_likelihood(self, second: Self) -> f64 {
+        let rate = self.detection_rate();
+        let rising = |from: f64, n: usize| (0..n).map(|i| (from + i as f64).ln()).sum::<f64>();
+        let missed = second.expected.saturating_sub(second.seen);
+        rising(rate * RATE_STRENGTH, second.seen) + rising((1.0 - rate) * RATE_STRENGTH, missed)
+            - rising(RATE_STRENGTH, second.expected)
+    }
+
     /// Returns the sum of both counts.
     pub fn plus(self, other: Self) -> Self {
         Self { expected: self.expected + other.expected, seen: self.seen + other.seen }
@@ -233,5 +248,11 @@ mod tests {
         assert_eq!(counts, DetectionCounts { expected: 18, seen: 8 });
         assert!((counts.detection_rate() - 0.45).abs() < 1e-12);
         assert!((DetectionCounts::default().detection_rate() - 0.5).abs() < 1e-12);
+        // one opportunity has the rate itself, and the four outcomes of two add up to one
+        let outcome = |seen, expected| counts.log_likelihood(DetectionCounts { expected, seen }).exp();
+        assert!((outcome(1, 1) - 0.45).abs() < 1e-12 && (outcome(0, 1) - 0.55).abs() < 1e-12);
+        assert!((outcome(0, 2) + 2.0 * outcome(1, 2) + outcome(2, 2) - 1.0).abs() < 1e-12);
+        // the second miss is less surprising than the first
+        assert!(outcome(0, 2) > outcome(0, 1).powi(2));
     }
 }

@@ -50,8 +50,8 @@ fn what_is_moved_between_two_runs_is_gone_and_added() {
         let (left, new) = (was.difference(&is).copied().collect(), is.difference(&was).copied().collect());
         match association == given {
             true => assert_eq!((gone, added), (left, new)),
-            // object 15 stands near the old place of 3 and is taken for it; seven of its boxes go to 8
-            false => assert!(!gone.is_empty() && gone.is_subset(&left) && added.is_subset(&new), "{prior:?}"),
+            // object 15 stands near the old place of 3 and is taken for it
+            false => assert!(gone.len() >= 2 && gone.is_subset(&left) && added.is_subset(&new), "{prior:?}"),
         }
         assert_eq!(report.gone, prior.gone);
     }

@@ -29,8 +29,7 @@ pub struct DetectionOpportunities {
     pub all: DetectionCounts,
     /// Opportunities that began before the last detection.
     pub before: DetectionCounts,
-    /// Later opportunities from a direction with an earlier detection. All later ones if the object has no
-    /// detections.
+    /// Later opportunities from a direction with an earlier detection.
     pub since: usize,
 }
 
@@ -50,7 +49,7 @@ impl OpportunityCounter {
         match last_seen {
             Some(last) if sight.frame <= last => self.opportunities.before.expected += 1,
             Some(_) => self.opportunities.since += usize::from(is_near()),
-            None => self.opportunities.since += 1,
+            None => {}
         }
         self.is_seen = false;
     }

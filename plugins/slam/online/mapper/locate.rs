@@ -13,7 +13,7 @@ mod agreement;
 mod layout;
 
 use agreement::Agreement;
-use layout::{Layout, LayoutObject};
+use layout::{Layout, LayoutObject, is_reliable};
 
 /// Start pose of a run in a prior map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -25,7 +25,7 @@ pub struct Relocalization {
     pub noise: Noise,
     /// Matched objects: ids in the run, ids in the prior map.
     pub matches: Vec<(ObjectId, ObjectId)>,
-    /// Log-likelihood lead over the second best pose, in nats.
+    /// Log-likelihood lead over the second best explanation, another pose or a different room, in nats.
     pub lead: f64,
     /// Mean intersection over union of the boxes of matched objects with the projections of the prior
     /// ellipsoids.
@@ -38,18 +38,19 @@ pub struct Relocalization {
 const UNKNOWN_CENTRE_VARIANCE: f64 = 0.04;
 
 impl Mapper {
-    /// Finds the start pose in `map` from the mapped objects. The covariances in `map` are used unchanged.
-    /// `None` as long as the result is ambiguous.
+    /// Finds the start pose in `map` from the mapped objects with enough detections. `None` as long as the
+    /// result is ambiguous.
     pub fn locate(&self, map: &PriorMap) -> Option<Relocalization> {
         let first = self.pose_of(0)?;
-        let marks = self.objects().filter_map(|(measured, quadric)| self.layout_object(measured, &quadric));
-        let layout =
-            Layout::new(marks.collect(), self.up(), map, self.settings.association.uses_source_ids());
-        let (aligned, agreement) = layout.align(|aligned| self.agreement(aligned, &layout, map))?;
+        let by_name = self.settings.association.uses_source_ids();
+        let reliable = self.objects().filter(|(measured, _)| is_reliable(measured.classes()));
+        let marks = reliable.filter_map(|(measured, quadric)| self.layout_object(measured, &quadric));
+        let layout = Layout::new(marks.collect(), self.up(), map, by_name);
+        let (aligned, agreement) = layout.align(|aligned| self.agreement(aligned, by_name, map))?;
         let start = aligned.known_from_local.compose(&first);
         let noise = aligned.noise(&first).ok()?;
-        let (Agreement { overlap, seen }, lead) = (agreement, aligned.lead);
-        Some(Relocalization { start, noise, lead, overlap, seen, matches: aligned.matches })
+        let Agreement { overlap, seen, .. } = agreement;
+        Some(Relocalization { start, noise, lead: aligned.lead, overlap, seen, matches: aligned.matches })
     }
 
     fn layout_object(&self, measured: &ObjectMeasurements, quadric: &DualQuadric) -> Option<LayoutObject> {

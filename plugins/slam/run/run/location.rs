@@ -6,12 +6,13 @@ use manifactor_online::{FrameReport, Mapper, Relocalization};
 use manifactor_recording::prior_map::PriorMap;
 use manifactor_recording::sequence::Sequence;
 use manifactor_solve::Observer;
+use std::sync::Arc;
 
 /// Repeated search for the pose of a stream in a prior map, until it is found.
 #[derive(Debug)]
 pub(super) struct StartSearch {
-    /// The prior map with trusted covariances.
-    map: Option<PriorMap>,
+    /// The prior map.
+    map: Option<Arc<PriorMap>>,
     /// Frames since the last search.
     frames: usize,
 }
@@ -22,7 +23,7 @@ const RETRY_AFTER_FRAMES: usize = 15;
 
 impl StartSearch {
     pub(super) fn new(settings: &RunSettings) -> Self {
-        Self { map: settings.unknown_start().map(|prior| prior.inflated_map()), frames: 0 }
+        Self { map: settings.unknown_start().map(|prior| Arc::clone(&prior.map)), frames: 0 }
     }
 
     /// Searches for the pose after a frame. Returns it at most once.

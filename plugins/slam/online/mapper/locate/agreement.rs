@@ -1,19 +1,19 @@
-//! Agreement of the boxes of a stream with a pose in a prior map.
+//! Agreement of the detections of a stream with a pose in a prior map.
 //!
 //! A pose predicts boxes. Boxes of matched objects should lie on the projections of the prior ellipsoids.
 //! Other prior objects in view should be detected too: in a different room, a few objects may stand as in the
 //! map, but the rest is missing.
-use super::layout::{AlignedLayout, Layout};
+use super::layout::{AlignedLayout, is_reliable, mixed_with_change};
 use crate::mapper::Mapper;
 use manifactor_geometry::Se3;
 use manifactor_mapping::estimate::visibility::{ExpectedObject, VisibleObject, visit_visible_objects};
 use manifactor_mapping::mapping::measurements::ObjectBox;
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, DualQuadric};
-use manifactor_recording::prior_map::{PriorMap, PriorObject};
+use manifactor_recording::prior_map::{DetectionCounts, PriorMap, PriorObject};
 use manifactor_recording::sequence::ObjectId;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-/// Agreement of boxes with a pose in the prior map.
+/// Agreement of detections with a pose in the prior map.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Agreement {
     /// Mean intersection over union of the boxes of matched objects with the projections of the prior
@@ -21,23 +21,8 @@ pub(super) struct Agreement {
     pub overlap: f64,
     /// Detected share of the prior objects that should be visible, from 0 to 1.
     pub seen: f64,
-}
-
-/// Agreement at which a pose is accepted. Chosen on the streams listed in `docs/decisions/prior-maps.md`.
-const MIN_AGREEMENT: f64 = 0.45;
-/// Agreement at which a pose counts as a rival of the best one.
-const MIN_RIVAL_AGREEMENT: f64 = 0.3;
-
-impl Agreement {
-    /// Returns the overlap times the detected share: an undetected object counts as no overlap.
-    fn score(self) -> f64 {
-        self.overlap * self.seen
-    }
-
-    /// Returns whether the agreement is good enough to accept a pose.
-    pub(super) fn is_accepted(self) -> bool {
-        self.score() >= MIN_AGREEMENT
-    }
+    /// Log-likelihood ratio of the prior objects that should be visible and were never detected, in nats.
+    pub missed: f64,
 }
 
 /// Number of boxes per object that are compared with projections, at most.
@@ -48,16 +33,21 @@ const SEARCHED_FRAMES: usize = 300;
 const MIN_SHOWN_IOU: f64 = 0.3;
 
 impl Mapper {
-    /// Returns the agreement of boxes with a pose; `None` if it is too low for any pose.
-    pub(super) fn agreement(
-        &self,
-        aligned: &AlignedLayout,
-        layout: &Layout,
-        map: &PriorMap,
-    ) -> Option<Agreement> {
-        let overlap = Some(self.overlap(aligned, map)).filter(|overlap| *overlap >= MIN_RIVAL_AGREEMENT)?;
-        let seen = self.detected_share(&aligned.known_from_local, layout, map);
-        Some(Agreement { overlap, seen }).filter(|agreement| agreement.score() >= MIN_RIVAL_AGREEMENT)
+    /// Returns the agreement of detections with a pose.
+    pub(super) fn agreement(&self, aligned: &AlignedLayout, by_name: bool, map: &PriorMap) -> Agreement {
+        let counts = self.detections_of_map(&aligned.known_from_local, by_name, map);
+        let (mut expected, mut seen, mut missed) = (0.0, 0.0, 0.0);
+        for (id, now) in counts {
+            let Some(object) = map.object(id).filter(|object| is_reliable(&object.classes)) else { continue };
+            expected += now.expected as f64 * object.detection_counts.detection_rate();
+            seen += now.seen as f64;
+            if now.seen == 0 && aligned.matches.iter().all(|(_, known)| *known != id) {
+                missed += mixed_with_change(object.detection_counts.log_likelihood(now));
+            }
+        }
+        // less than one expected detection is no evidence
+        let seen = f64::min(seen / f64::max(expected, 1.0), 1.0);
+        Agreement { overlap: self.overlap(aligned, map), seen, missed }
     }
 
     fn overlap(&self, aligned: &AlignedLayout, map: &PriorMap) -> f64 {
@@ -74,42 +64,50 @@ impl Mapper {
         mean(aligned.matches.iter().filter_map(of_pair)).unwrap_or_default()
     }
 
-    /// Returns the detected share of the prior objects at a pose. The expected number is the sum of the
-    /// detection rates over all opportunities.
-    fn detected_share(&self, place: &Se3, layout: &Layout, map: &PriorMap) -> f64 {
+    /// Returns the opportunities to detect the prior objects from a pose, and the detections among them.
+    fn detections_of_map(
+        &self,
+        place: &Se3,
+        by_name: bool,
+        map: &PriorMap,
+    ) -> BTreeMap<ObjectId, DetectionCounts> {
         let expected = |object: &PriorObject| ExpectedObject::new(object.id, object.quadric, object.least_px);
         let objects: Vec<ExpectedObject> = map.objects.iter().map(|object| expected(object)).collect();
         let frames =
             self.live_poses.iter().enumerate().skip(self.live_poses.len().saturating_sub(SEARCHED_FRAMES));
         let poses = frames
             .filter_map(|(frame, live)| Some((frame, live.timestamp, place.compose(&self.pose_of(frame)?))));
-        let (mut expected, mut seen) = (0.0, 0.0);
+        let mut counts: BTreeMap<ObjectId, DetectionCounts> = BTreeMap::new();
         // objects detected in the current opportunity
         let mut is_seen = BTreeSet::new();
         let border = self.settings.detections.border_px;
         visit_visible_objects(&objects, poses, &self.camera, *border, |sight| {
             let Some(object) = map.object(sight.id) else { return };
+            let counts = counts.entry(sight.id).or_default();
             if sight.begins {
-                expected += object.detection_counts.detection_rate();
+                counts.expected += 1;
                 is_seen.remove(&sight.id);
             }
-            if !is_seen.contains(&sight.id) && self.is_shown(&sight, object, layout) {
-                seen += 1.0;
+            if !is_seen.contains(&sight.id) && self.is_shown(&sight, object, by_name) {
+                counts.seen += 1;
                 is_seen.insert(sight.id);
             }
         });
-        // less than one expected detection is no evidence
-        f64::min(seen / f64::max(expected, 1.0), 1.0)
+        counts
     }
 
-    /// Returns whether a visible prior object has a matching box.
-    fn is_shown(&self, sight: &VisibleObject, object: &PriorObject, layout: &Layout) -> bool {
-        layout.possible_matches(object.id).any(|local| {
-            let view = self.measured(local).and_then(|measured| measured.view(sight.frame));
-            view.is_some_and(|view| {
+    /// Returns whether a visible prior object has a matching box, of any object of the run.
+    fn is_shown(&self, sight: &VisibleObject, object: &PriorObject, by_name: bool) -> bool {
+        self.measurements.objects.iter().any(|measured| {
+            let shows = |view: &ObjectBox| {
                 let outline = self.outline(&sight.pose, &object.quadric, view);
                 outline.is_some_and(|outline| outline.iou(&view.bounding_box) >= MIN_SHOWN_IOU)
-            })
+            };
+            let may_be = || match by_name {
+                true => measured.id == object.id,
+                false => measured.classes().is_compatible(&object.classes),
+            };
+            measured.view(sight.frame).is_some_and(shows) && may_be()
         })
     }
 

@@ -1,8 +1,10 @@
 //! Relocalization by the classes and the layout of objects.
 //!
 //! If the up direction is known, two pairs of objects with similar classes and equal distances in both
-//! maps give a hypothesis; otherwise three pairs do. Its score counts the other objects that match, and those
-//! that should match and do not. The best hypothesis is accepted if no other one has a similar score.
+//! maps give a hypothesis; otherwise three pairs do. Its score is the log-likelihood ratio of this place
+//! against a different room, whose objects are scattered like those of the map. It counts objects that match,
+//! objects of the run without a match, and objects of the map that should have been detected. A different room
+//! fits somewhere by chance, so the score is reduced by the logarithm of the number of places.
 use super::agreement::Agreement;
 use manifactor_association::best_assignment;
 use manifactor_geometry::{PointPairs, Se3};
@@ -12,7 +14,7 @@ use manifactor_quadric::DualQuadric;
 use manifactor_recording::fusion::ClassFusion;
 use manifactor_recording::prior_map::{PriorMap, PriorObject};
 use manifactor_recording::sequence::ObjectId;
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, SymmetricEigen, Vector3};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -26,7 +28,7 @@ pub(crate) struct LayoutObject {
     centre: Vector3<f64>,
     /// Standard deviation of the centre, in metres.
     sigma: f64,
-    classes: HashMap<String, f64>,
+    classes: ClassFusion,
 }
 
 /// The objects of the run (local) and of the prior map (known).
@@ -38,7 +40,7 @@ pub(crate) struct Layout {
     up: Option<[Direction; 2]>,
     /// Pairs that may show one object.
     pairs: Vec<CandidateMatch>,
-    /// Logarithm of the volume of the known marks, in m³.
+    /// Logarithm of the volume of the known marks, in m³: negative mean logarithm of their density.
     log_volume: f64,
     /// Median distance of a known mark to its nearest neighbour.
     gap: f64,
@@ -62,7 +64,8 @@ pub(crate) struct AlignedLayout {
     pub known_from_local: Se3,
     /// Matched marks: local ids, known ids.
     pub matches: Vec<(ObjectId, ObjectId)>,
-    /// Log-likelihood lead over the second best pose, in nats.
+    /// Log-likelihood ratio of this pose against a different room, in nats; from `align`, the lead over the
+    /// second best explanation.
     pub lead: f64,
     centre: Vector3<f64>,
     /// Standard deviations in rad and m, at the centre of the matched local marks.
@@ -71,30 +74,39 @@ pub(crate) struct AlignedLayout {
     up: Option<Direction>,
 }
 
-/// Standard deviation added to the centre of an object, relative to its mean semi-axis.
-const CENTRE_SIGMA_OF_SIZE: f64 = 0.5;
-/// Smallest similarity of the classes of matching marks (Bhattacharyya coefficient).
-const MIN_CLASS_SIMILARITY: f64 = 0.3;
+/// Standard deviation added to the centre of an object, relative to its mean semi-axis. On fr1, centres of
+/// objects that were found again are apart by 0.3 of both sizes (median).
+const CENTRE_SIGMA_OF_SIZE: f64 = 0.2;
+/// Number of detections below which an object may be an error of the detector.
+const MIN_DETECTIONS: usize = 8;
+/// Probability that an object is new or removed since the map was made, or is an error of the detector.
+const CHANGED_SHARE: f64 = 0.2;
 /// Share of boxes with a random class, one of `CLASS_COUNT`.
 const CLASS_ERROR: f64 = 0.1;
 const CLASS_COUNT: f64 = 20.0;
 /// Distance of matching marks, at most, in standard deviations.
 const MAX_MATCH_SIGMA: f64 = 3.0;
-/// Cost of a local mark inside the prior map without a match, in nats.
-const UNMATCHED_COST: f64 = 1.6;
 /// Number of distinct hypotheses that are refined.
 const MAX_REFINED_HYPOTHESES: usize = 40;
 /// Rounds that alternate between matching and pose estimation.
 const MATCHING_ROUNDS: usize = 5;
 /// Two poses count as one if each mark moves by less than this, in units of twice its σ.
 const SAME_POSE_SIGMA: f64 = 3.0;
-/// Required number of matches.
-const MIN_MATCHES: usize = 4;
-/// Required share of matches among the local marks inside the prior map.
-const MIN_MATCHED_SHARE: f64 = 0.6;
-/// Required lead over the second best pose, in nats. Chosen on the streams listed in
-/// `docs/decisions/prior-maps.md`.
-const MIN_LEAD_NATS: f64 = 12.0;
+/// Required number of matches. Four objects that stand nearly in a plane have nearly the same layout in a mirror:
+/// with four, 8 of 16 mirrored streams of fr1 are accepted.
+const MIN_MATCHES: usize = 5;
+/// Required lead over the second best explanation, in nats: at most one in 10,000 places is wrong, if the
+/// model holds.
+const MIN_LEAD_NATS: f64 = 9.2;
+/// Factor on the standard deviations of the pose, because the errors of the objects of a run are correlated: on
+/// fr1, with 10 to 20 matches, poses are off by 2° and 5 cm (median).
+const POSE_SIGMA_SCALE: f64 = 2.0;
+/// Required overlap of the boxes of matched objects with the projections of the prior ellipsoids. Right poses on
+/// fr1 have 0.5 or more. It rejects a place where centres fit, and sizes do not.
+const MIN_OVERLAP: f64 = 0.45;
+/// Smallest spread of the known marks along an axis, in metres. It keeps the volume of a map in a plane
+/// positive.
+const MIN_SPREAD_M: f64 = 0.05;
 
 /// Weight of the up direction relative to all marks together.
 const UP_WEIGHT: f64 = 10.0;
@@ -109,12 +121,7 @@ impl LayoutObject {
     pub(crate) fn new(id: ObjectId, quadric: &DualQuadric, variance: f64, classes: &ClassFusion) -> Self {
         let size = quadric.semi_axes.mean();
         let sigma = (variance + (CENTRE_SIGMA_OF_SIZE * size).powi(2)).sqrt();
-        let classes = classes.shares().map(|(class, share)| (class.to_owned(), share)).collect();
-        Self { id, centre: quadric.centroid(), sigma, classes }
-    }
-
-    fn class_share(&self, class: &str) -> f64 {
-        self.classes.get(class).copied().unwrap_or_default()
+        Self { id, centre: quadric.centroid(), sigma, classes: classes.clone() }
     }
 }
 
@@ -131,17 +138,9 @@ impl Layout {
             let variance = object.covariance().fixed_view::<3, 3>(3, 3).trace() / 3.0;
             LayoutObject::new(object.id, &object.quadric, variance, &object.classes)
         };
-        let known: Vec<LayoutObject> = map.objects.iter().map(mark).collect();
-        let sides = |axis: usize| {
-            let along = known.iter().map(|mark| {
-                (
-                    mark.centre[axis] - MAX_MATCH_SIGMA * mark.sigma,
-                    mark.centre[axis] + MAX_MATCH_SIGMA * mark.sigma,
-                )
-            });
-            along.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))).map_or(1.0, |(from, to)| to - from)
-        };
-        let log_volume = (0..3).map(|axis| sides(axis).ln()).sum();
+        let known: Vec<LayoutObject> =
+            map.objects.iter().filter(|object| is_reliable(&object.classes)).map(mark).collect();
+        let log_volume = log_volume(&known);
         let up = up.zip(map.up).map(|(local, known)| [local, known]);
         let gap = gap(&known);
         let mut layout = Self { local, known, up, pairs: vec![], log_volume, gap };
@@ -152,30 +151,26 @@ impl Layout {
     fn pairs(&self, by_name: bool) -> Vec<CandidateMatch> {
         let mut usual: HashMap<&str, f64> = HashMap::new();
         for mark in &self.known {
-            for (class, share) in &mark.classes {
+            for (class, share) in mark.classes.shares() {
                 *usual.entry(class).or_default() += share / self.known.len() as f64;
             }
         }
         let (doubt, one_of_all) = (CLASS_ERROR / CLASS_COUNT, (self.known.len() as f64).ln());
         let mut pairs = vec![];
         for (l, local) in self.local.iter().enumerate() {
-            let mut classes: Vec<_> = local.classes.iter().collect();
-            classes.sort_by(|a, b| a.0.cmp(b.0));
             let over = |of: &dyn Fn(&str) -> f64| -> f64 {
-                classes.iter().map(|(class, share)| *share * of(class)).sum()
+                local.classes.shares().map(|(class, share)| share * of(class)).sum()
             };
             let by_chance =
                 (1.0 - CLASS_ERROR) * over(&|class| usual.get(class).copied().unwrap_or_default()) + doubt;
             for (k, known) in self.known.iter().enumerate() {
-                let alike: f64 =
-                    classes.iter().map(|(class, share)| (*share * known.class_share(class)).sqrt()).sum();
-                // a mark without a class may match any class
-                let is_nameless = local.classes.is_empty() || known.classes.is_empty();
+                let is_nameless = local.classes.is_nameless() || known.classes.is_nameless();
                 let evidence = match by_name {
                     true if local.id == known.id => 0.0,
                     false if is_nameless => -one_of_all,
-                    false if alike >= MIN_CLASS_SIMILARITY => {
-                        let by_class = (1.0 - CLASS_ERROR) * over(&|class| known.class_share(class)) + doubt;
+                    false if local.classes.is_compatible(&known.classes) => {
+                        let by_class =
+                            (1.0 - CLASS_ERROR) * over(&|class| known.classes.share(class)) + doubt;
                         (by_class / by_chance).ln() - one_of_all
                     }
                     _ => continue,
@@ -192,39 +187,41 @@ impl Layout {
         pairs
     }
 
-    /// Returns the local marks that may match this known one.
-    pub(super) fn possible_matches(&self, known: ObjectId) -> impl Iterator<Item = ObjectId> {
-        let pairs = self.pairs.iter().filter(move |pair| self.known[pair.known].id == known);
-        pairs.map(|pair| self.local[pair.local].id)
-    }
-
-    /// Returns the pose of the local marks, if it is unique. `agreement` returns the agreement of boxes with
-    /// a pose. A pose without agreement is rejected, whatever its score.
+    /// Returns the pose of the local marks, if it is unique. `agreement` compares the detections with a pose.
     pub(super) fn align(
         &self,
-        agreement: impl Fn(&AlignedLayout) -> Option<Agreement>,
+        agreement: impl Fn(&AlignedLayout) -> Agreement,
     ) -> Option<(AlignedLayout, Agreement)> {
-        let mut ranked = self.ranked_poses();
-        // the agreement is expensive to compute, and no lead exceeds the score
-        if ranked.first().is_none_or(|(score, ..)| *score < MIN_LEAD_NATS) {
+        let possible: Vec<AlignedLayout> =
+            self.ranked_poses().into_iter().map(|ranked| self.aligned(ranked)).collect();
+        // missed objects only reduce a score, and the comparison with the detections is slow
+        if possible.iter().all(|aligned| aligned.lead < MIN_LEAD_NATS) {
             return None;
         }
-        ranked.retain(|(score, ..)| *score > 0.0);
-        let mut possible = ranked.into_iter().filter_map(|(score, place, matches)| {
-            let aligned = self.aligned(place, &matches, score);
-            let agreement = agreement(&aligned)?;
-            Some((aligned, agreement))
-        });
-        let (mut best, agreement) = possible.next()?;
-        best.lead -= possible.next().map_or(0.0, |(next, _)| next.lead);
-        let place = &best.known_from_local;
-        let among = self.local.iter().filter(|mark| self.is_among_known(&place.act(&mark.centre))).count();
+        let mut best: Option<(AlignedLayout, Agreement)> = None;
+        // the score of a different room
+        let mut second = 0.0_f64;
+        for mut aligned in possible {
+            if aligned.lead <= second {
+                continue;
+            }
+            let agreement = agreement(&aligned);
+            aligned.lead += agreement.missed;
+            match &mut best {
+                Some((best, _)) if aligned.lead <= best.lead => second = second.max(aligned.lead),
+                best => {
+                    let before = best.replace((aligned, agreement));
+                    second = before.map_or(second, |(before, _)| second.max(before.lead));
+                }
+            }
+        }
+        let (mut best, agreement) = best?;
+        best.lead -= second;
         let AlignedLayout { lead, matches, .. } = &best;
-        tracing::debug!(lead, matches = matches.len(), among, ?agreement, "a place in the prior map");
-        let is_clear = matches.len() >= MIN_MATCHES
-            && matches.len() as f64 >= MIN_MATCHED_SHARE * among as f64
-            && *lead >= MIN_LEAD_NATS;
-        (is_clear && agreement.is_accepted()).then_some((best, agreement))
+        tracing::debug!(lead, matches = matches.len(), ?agreement, "a place in the prior map");
+        let is_clear =
+            matches.len() >= MIN_MATCHES && *lead >= MIN_LEAD_NATS && agreement.overlap >= MIN_OVERLAP;
+        is_clear.then_some((best, agreement))
     }
 
     /// Returns candidate poses with scores and matches, the best first.
@@ -289,12 +286,14 @@ impl Layout {
         points.rigid(MIN_RELATIVE_SPREAD).map(|found| Se3::new(found.rotation, found.translation))
     }
 
-    /// Returns the log-likelihood ratio of a pair at a pose, in nats; `None` if the marks are too far apart.
+    /// Returns the log-likelihood ratio of a local mark with this match at a pose, in nats; `None` if the marks
+    /// are too far apart. The mark may be a new object, so it is never below that of an unmatched mark.
     fn gain(&self, place: &Se3, pair: &CandidateMatch) -> Option<f64> {
         let apart = place.act(&self.local[pair.local].centre) - self.known[pair.known].centre;
         let square = apart.norm_squared() / (pair.sigma * pair.sigma);
         let density = -0.5 * square - 1.5 * (TAU * pair.sigma * pair.sigma).ln();
-        Some(pair.evidence + density + self.log_volume).filter(|_| square < MAX_MATCH_SIGMA * MAX_MATCH_SIGMA)
+        let ratio = mixed_with_change(pair.evidence + density + self.log_volume);
+        Some(ratio).filter(|_| square < MAX_MATCH_SIGMA * MAX_MATCH_SIGMA)
     }
 
     /// Returns an upper bound of the score of a pose: it lets a known mark match several local ones.
@@ -314,12 +313,12 @@ impl Layout {
             place = self.fit_pose(&self.matches(&place))?;
         }
         // the last step may have moved marks apart, so match again
-        let matches = self.matches(&place);
+        let matches = Some(self.matches(&place)).filter(|matches| matches.len() >= 2)?;
         let gained: f64 = matches.iter().filter_map(|pair| self.gain(&place, pair)).sum();
         let is_matched = |l: usize| matches.iter().any(|pair: &CandidateMatch| pair.local == l);
         let alone = (0..self.local.len())
             .filter(|l| !is_matched(*l) && self.is_among_known(&place.act(&self.local[*l].centre)));
-        Some((gained - UNMATCHED_COST * alone.count() as f64, place, matches))
+        Some((gained + CHANGED_SHARE.ln() * alone.count() as f64, place, matches))
     }
 
     fn matches(&self, place: &Se3) -> Vec<CandidateMatch> {
@@ -347,22 +346,63 @@ impl Layout {
         nearest < self.gap
     }
 
-    fn aligned(&self, place: Se3, matches: &[CandidateMatch], lead: f64) -> AlignedLayout {
+    /// Returns a ranked pose with its accuracy. Its lead is the score, reduced by the logarithm of the number
+    /// of poses in the map that are distinct at this accuracy.
+    fn aligned(&self, (score, place, matches): (f64, Se3, Vec<CandidateMatch>)) -> AlignedLayout {
         let n = matches.len() as f64;
         let centre = matches.iter().map(|pair| self.local[pair.local].centre).sum::<Vector3<f64>>() / n;
         let mean = |of: &dyn Fn(&CandidateMatch) -> f64| (matches.iter().map(of).sum::<f64>() / n).sqrt();
-        let sigma = mean(&|pair| pair.sigma * pair.sigma) / n.sqrt();
-        let spread = mean(&|pair| (self.local[pair.local].centre - centre).norm_squared());
+        let shift = mean(&|pair| pair.sigma * pair.sigma) / n.sqrt();
+        let turn = shift / mean(&|pair| (self.local[pair.local].centre - centre).norm_squared());
+        let [log_turn, log_shift] = [turn, shift].map(|sigma| (TAU.sqrt() * sigma).ln());
+        let log_turns = match self.up {
+            Some(_) => TAU.ln() - log_turn,
+            None => (2.0 * TAU * TAU).ln() - 3.0 * log_turn,
+        };
         let name = |pair: &CandidateMatch| (self.local[pair.local].id, self.known[pair.known].id);
         AlignedLayout {
             known_from_local: place,
             matches: matches.iter().map(name).collect(),
-            lead,
+            lead: score - (self.log_volume - 3.0 * log_shift) - f64::max(log_turns, 0.0),
             centre,
-            sigmas: [sigma / spread, sigma],
+            sigmas: [turn, shift],
             up: self.up.map(|[_, up]| up),
         }
     }
+}
+
+/// Returns the log-likelihood ratio of an object that is unchanged with the ratio `ratio`, or changed.
+pub(super) fn mixed_with_change(ratio: f64) -> f64 {
+    ((1.0 - CHANGED_SHARE) * ratio.exp() + CHANGED_SHARE).ln()
+}
+
+/// Returns whether an object has enough detections to be used.
+pub(super) fn is_reliable(classes: &ClassFusion) -> bool {
+    classes.detections() >= MIN_DETECTIONS
+}
+
+/// Returns the logarithm of the volume of marks: that of a normal distribution along their principal axes.
+/// Medians keep single marks far away from enlarging it.
+fn log_volume(marks: &[LayoutObject]) -> f64 {
+    let n = marks.len().max(1) as f64;
+    let mean = marks.iter().map(|mark| mark.centre).sum::<Vector3<f64>>() / n;
+    let scatter = marks.iter().map(|mark| (mark.centre - mean) * (mark.centre - mean).transpose());
+    let axes = SymmetricEigen::new(scatter.sum::<Matrix3<f64>>()).eigenvectors;
+    let spread = |axis: usize| {
+        let along: Vec<f64> = marks.iter().map(|mark| axes.column(axis).dot(&mark.centre)).collect();
+        let middle = median(along.clone());
+        let deviations = along.iter().map(|place| (place - middle).abs()).collect();
+        STD_PER_MEDIAN_DEVIATION * median(deviations) + MIN_SPREAD_M
+    };
+    (0..3).map(|axis| spread(axis).ln() + 0.5 * (TAU * std::f64::consts::E).ln()).sum()
+}
+
+/// Standard deviation of a normal distribution relative to its median absolute deviation.
+const STD_PER_MEDIAN_DEVIATION: f64 = 1.4826;
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or_default()
 }
 
 /// Returns the median distance of a mark to its nearest neighbour.
@@ -371,9 +411,7 @@ fn gap(marks: &[LayoutObject]) -> f64 {
         let others = marks.iter().filter(|other| other.id != mark.id);
         others.map(|other| (other.centre - mark.centre).norm()).fold(f64::INFINITY, f64::min)
     };
-    let mut gaps: Vec<f64> = marks.iter().map(to_next).collect();
-    gaps.sort_by(f64::total_cmp);
-    gaps.get(gaps.len() / 2).copied().unwrap_or_default()
+    median(marks.iter().map(to_next).collect())
 }
 
 impl AlignedLayout {
@@ -382,7 +420,7 @@ impl AlignedLayout {
     /// # Errors
     /// If the pose is not finite.
     pub(crate) fn noise(&self, local: &Se3) -> Result<Noise, NoiseError> {
-        let [turn, shift] = self.sigmas;
+        let [turn, shift] = self.sigmas.map(|sigma| POSE_SIGMA_SCALE * sigma);
         let shift = shift.hypot(turn * (local.translation - self.centre).norm());
         let mut covariance = DMatrix::from_diagonal_element(6, 6, shift * shift);
         let known_from_camera = self.known_from_local.rotation.compose(&local.rotation);

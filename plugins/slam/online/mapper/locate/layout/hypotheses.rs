@@ -3,7 +3,7 @@ use super::{CandidateMatch, Layout};
 use manifactor_geometry::Se3;
 
 /// Maximum number of hypotheses.
-const MAX_HYPOTHESES: usize = 2000;
+const MAX_HYPOTHESES: usize = 4000;
 /// Maximum number of groups of local marks.
 const MAX_GROUPS: usize = 2000;
 
