@@ -212,9 +212,13 @@ fn a_class_that_a_star_leaves_out_has_no_factor() {
     assert!(found[0].left_out.is_empty());
 }
 
+fn sizes(sizes: &str) -> Result<Vec<SemanticRule>, String> {
+    read(&format!("{TABLE}sizes = {sizes}"))
+}
+
 #[test]
 fn a_size_is_a_rule_with_a_size_prior() {
-    let rules = read("sizes = [{ classes = ['cup'], size_m = [0.1, 0.2, 0.3], spread = 2.0 }]").unwrap();
+    let rules = sizes("[{ classes = ['cup'], size_m = [0.1, 0.2, 0.3], spread = 2.0 }]").unwrap();
     assert_eq!(rules.len(), 1);
     assert!(rules[0].applies("cup", &ClassAliases::default()) && !rules[0].optional);
     assert_eq!(rules[0].noise, Noise::sigma(2.0f64.ln()).unwrap());
@@ -227,7 +231,7 @@ fn a_size_is_a_rule_with_a_size_prior() {
 
 #[test]
 fn the_household_table_gives_no_warning_about_classes_without_objects() {
-    let rules = read("sizes = 'household'").unwrap();
+    let rules = sizes("'household'").unwrap();
     assert!(rules.len() > 30 && rules.iter().all(|rule| rule.optional));
     let of = |class: &str| rules.iter().filter(|rule| rule.applies(class, &ClassAliases::default())).count();
     assert_eq!([of("cup"), of("tv monitor"), of("zebra")], [1, 1, 0]);
@@ -235,10 +239,10 @@ fn the_household_table_gives_no_warning_about_classes_without_objects() {
 
 #[test]
 fn wrong_sizes_are_refused_at_their_place() {
-    let refused = |row: &str| read(&format!("sizes = [\n{{ {row} }}]")).unwrap_err();
+    let refused = |row: &str| sizes(&format!("[\n{{ {row} }}]")).unwrap_err();
     for (row, expected) in [
-        ("classes = ['cup'], size_m = [0.1, -0.2, 0.3], spread = 1.5", "rules.toml:2:37: expected a length"),
-        ("classes = ['cup'], size_m = [0.1, 0.2], spread = 1.5", "rules.toml:2:"),
+        ("classes = ['cup'], size_m = [0.1, -0.2, 0.3], spread = 1.5", "rules.toml:3:37: expected a length"),
+        ("classes = ['cup'], size_m = [0.1, 0.2], spread = 1.5", "rules.toml:3:"),
         ("classes = ['cup'], size_m = [0.1, 0.2, 0.3], spread = 0.5", "expected a factor above 1"),
         ("classes = ['cup'], size_m = [0.1, 0.2, 0.3]", "missing field `spread`"),
         ("classes = ['cup'], size = [0.1, 0.2, 0.3], spread = 1.5", "unknown field `size`"),
@@ -247,8 +251,8 @@ fn wrong_sizes_are_refused_at_their_place() {
         let told = refused(row);
         assert!(told.contains(expected), "{row}: {told}");
     }
-    let unknown = read("sizes = 'houshold'").unwrap_err();
+    let unknown = sizes("'houshold'").unwrap_err();
     assert!(unknown.contains("unknown sizes `houshold`"), "{unknown}");
-    assert!(read("sizes = 3").unwrap_err().contains("an array of sizes"));
-    assert!(read("sizes = 'nowhere.toml'").unwrap_err().contains("nowhere.toml"));
+    assert!(sizes("3").unwrap_err().contains("an array of sizes"));
+    assert!(sizes("'nowhere.toml'").unwrap_err().contains("nowhere.toml"));
 }
