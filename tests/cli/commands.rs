@@ -5,7 +5,6 @@ mod evaluate;
 pub(crate) mod experiment;
 mod graph;
 mod laws;
-mod learn;
 mod maps;
 mod names;
 mod new;

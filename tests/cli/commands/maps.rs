@@ -1,3 +1,6 @@
+//! Maps of earlier runs: runs that begin in them, and priors that are learned from them.
+mod learn;
+
 use crate::commands::online::{DESK, LIVE};
 use crate::{fed, folder, manifactor, path};
 use serde_json::Value;
