@@ -223,8 +223,11 @@ fn a_size_is_a_rule_with_a_size_prior() {
     assert!(rules[0].applies("cup", &ClassAliases::default()) && !rules[0].optional);
     assert_eq!(rules[0].noise, Noise::sigma(2.0f64.ln()).unwrap());
     let entry = rules[0].entry(vec!["q1".into()], None, 1.0).unwrap();
-    let text = serde_json::to_string(&entry.factor).unwrap();
-    assert!(text.starts_with(r#"{"type":"size_prior","semi_axes":[0.0"#), "{text}");
+    let factor = serde_json::to_value(&entry.factor).unwrap();
+    assert_eq!(factor["type"], "size_prior");
+    // s² = a² + (2/π) a (b + c) for half extents of 0.05, 0.1 and 0.15 m
+    let shortest = (0.05f64.powi(2) + std::f64::consts::FRAC_2_PI * 0.05 * 0.25).sqrt();
+    assert!((factor["semi_axes"][0].as_f64().unwrap() - shortest).abs() < 1e-12, "{factor}");
     let written = serde_json::to_value(&rules[0]).unwrap();
     assert_eq!(written["factor"]["type"], "size_prior");
 }
