@@ -1,7 +1,7 @@
 //! Priors that are learned from maps: sizes and orientation of objects, by class.
 //!
 //! Sizes are log-normal, for each semi-axis from the shortest to the longest. A class is shrunk towards its row
-//! of `sizes = "household"`, which counts as much as [`PRIOR_OBJECTS`] objects; a class without a row is shrunk
+//! of `sizes = "household"`, which counts as much as two objects; a class without a row is shrunk
 //! towards all objects. Orientations are counted: the vertical axis of an object, and whether its longest axis
 //! is horizontal. A class gets an orientation factor only if most of its objects agree.
 use super::ClassSize;
@@ -327,7 +327,7 @@ impl fmt::Display for LearnedPriors {
             match prior.orientation.orientation(&self.pooled.orientation) {
                 LearnedOrientation::Longest => write_axis(f, &name, "upright", ", axis = \"longest\"", tilt)?,
                 LearnedOrientation::Shortest => {
-                    write_axis(f, &name, "upright", ", axis = \"shortest\"", tilt)?
+                    write_axis(f, &name, "upright", ", axis = \"shortest\"", tilt)?;
                 }
                 LearnedOrientation::Lying => write_axis(f, &name, "horizontal_orientation_smooth", "", tilt)?,
                 LearnedOrientation::Resting => {}
