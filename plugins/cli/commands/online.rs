@@ -188,7 +188,14 @@ impl StreamWatcher for Frames<'_> {
                         "after {frames}, relocalized in the prior map by {objects}: from now on, names and poses are those of that map"
                     ));
                 }
-                if self.frames.is_multiple_of(self.command.every) || report.located.is_some() {
+                if let Some(noise) = &report.noise {
+                    let frames = count(report.frame + 1, "frame");
+                    output::print_note(&format!("after {frames}, noise estimated: {noise}"));
+                }
+                if self.frames.is_multiple_of(self.command.every)
+                    || report.located.is_some()
+                    || report.noise.is_some()
+                {
                     self.print_frame(report, mapper, took);
                 }
             }

@@ -18,6 +18,7 @@ use manifactor_association::{Associator, Corrections, FrameDetections, MapEstima
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{TypeName, manifold_name};
+use manifactor_mapping::estimate::variance::StreamNoise;
 use manifactor_mapping::estimate::{Estimate, EstimateError};
 use manifactor_mapping::gravity::GravityError;
 use manifactor_mapping::mapping::measurements::{Measurements, ObjectMeasurements};
@@ -28,7 +29,7 @@ use manifactor_mapping::semantics::RuleError;
 use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::{Camera, DualQuadric};
 use manifactor_recording::sequence::{Frame, ObjectId, Observation, Sequence, SequenceHeader};
-use manifactor_smoother::{ChangeError, Smoother, UpdateError};
+use manifactor_smoother::{ChangeError, Smoother, UpdateError, UpdateReport};
 use manifactor_solve::Observer;
 use object::ObjectState;
 use std::any::TypeId;
@@ -45,7 +46,10 @@ pub use locate::Relocalization;
 /// the smoother, if there is one.
 #[derive(Debug)]
 pub struct Mapper {
+    /// With the current noise of the stream.
     settings: Arc<RunSettings>,
+    /// For the batch solve at the end.
+    batch_settings: Arc<RunSettings>,
     camera: Camera,
     smoother: Smoother,
     up: UpEstimate,
@@ -116,9 +120,12 @@ pub enum FinishError {
 
 impl Mapper {
     /// Creates a map with the settings [for streams](RunSettings::for_stream). It is empty, or has the objects
-    /// of the prior map if the settings give one with a start pose.
+    /// of the prior map if the settings give one with a start pose. If the noise is to be estimated, the map
+    /// begins with the [initial](StreamNoise::initial) one.
     pub fn new(opening: SequenceHeader, settings: &RunSettings) -> Self {
-        let settings = settings.clone().for_stream();
+        let batch_settings = Arc::new(settings.clone().for_stream());
+        let noise = settings.variance_components.as_ref().map(StreamNoise::initial).unwrap_or_default();
+        let settings = Arc::new(noise.apply_to(&batch_settings));
         let mut online = settings.online.clone();
         if let Some(window) = &mut online.window {
             // only poses leave the window
@@ -137,7 +144,8 @@ impl Mapper {
             camera: opening.camera,
             smoother: Smoother::new(online),
             associator: settings.association.create_associator(opening.camera, &settings.aliases, &known),
-            settings: Arc::new(settings),
+            settings,
+            batch_settings,
             id_changes: ObjectIdChanges::default(),
             pending: vec![],
             up: UpEstimate::new(opening),
@@ -161,6 +169,22 @@ impl Mapper {
         report.pose = self.pose(report.frame).unwrap_or(report.pose);
         self.live_poses.push(StampedPose { timestamp: report.timestamp, pose: report.pose });
         Ok(report)
+    }
+
+    /// Replaces the noise of all motions and boxes, of earlier frames and of those to come. The final solve
+    /// does not use it.
+    ///
+    /// # Errors
+    /// If the smoother cannot be updated. The noise of the frames to come is replaced all the same.
+    pub fn set_noise(&mut self, noise: &StreamNoise) -> Result<UpdateReport, FrameError> {
+        self.settings = Arc::new(noise.apply_to(&self.batch_settings));
+        let (graph, ids) = self.smoother.graph();
+        for (entry, id) in graph.factors().iter().zip(ids) {
+            if let Some(entry) = noise.replace_noise_of(entry, &self.settings) {
+                self.smoother.replace(id, entry)?;
+            }
+        }
+        Ok(self.smoother.update()?)
     }
 
     /// Reconsiders all frames after the last one, and corrects their data association. The changes are
@@ -254,14 +278,19 @@ impl Mapper {
             Some(start) => Ok(start),
             None => {
                 let at = |i: usize| Some(StampedPose { pose: *poses.get(i)?, ..*self.live_poses.get(i)? });
-                rejection::initial_quadric(measured, at, self.camera, &self.settings)
+                rejection::initial_quadric(measured, at, self.camera, &self.batch_settings)
             }
         };
         let starts = self.measurements.objects.iter().map(start).collect();
-        let decisions =
-            self.semantic_factors.complete_decisions(&self.measurements, starts, &self.settings, frame.up);
+        let decisions = self.semantic_factors.complete_decisions(
+            &self.measurements,
+            starts,
+            &self.batch_settings,
+            frame.up,
+        );
         let decisions = decisions.map_err(MappingError::from)?;
-        let mapping = Mapping::assemble(&sequence, &self.settings, frame, self.measurements, decisions)?;
+        let mapping =
+            Mapping::assemble(&sequence, &self.batch_settings, frame, self.measurements, decisions)?;
         let mut values = mapping.values.clone();
         for (i, pose) in poses.into_iter().enumerate() {
             values.insert(pose_key(i), pose);
@@ -271,7 +300,7 @@ impl Mapper {
                 values.insert_boxed(key.clone(), value.erased().clone_box());
             }
         }
-        Ok(Estimate::from_start(sequence, mapping, values, &self.settings, observer)?)
+        Ok(Estimate::from_start(sequence, mapping, values, &self.batch_settings, observer)?)
     }
 
     /// Returns the estimate of a pose; `None` if it is not in the smoother.

@@ -19,6 +19,8 @@ use std::time::Instant;
 
 mod association;
 mod location;
+mod noise;
+mod state;
 mod stream;
 
 pub use stream::{StreamWatcher, online};

@@ -22,6 +22,12 @@ use std::path::{Path, PathBuf};
 #[derive(Default)]
 pub(crate) struct CollectedReports(Vec<FrameReport>);
 
+impl CollectedReports {
+    pub(crate) fn reports(&self) -> &[FrameReport] {
+        &self.0
+    }
+}
+
 impl StreamWatcher for CollectedReports {
     fn on_frame(
         &mut self,

@@ -1,8 +1,12 @@
 //! Variance components on data with known noise.
+use crate::online::{both, run_of};
 use manifactor_config::{Document, Format};
+use manifactor_graph::Manifold;
 use manifactor_graph::loss::Loss;
+use manifactor_slam::online::Mapper;
 use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
+use manifactor_slam::source::InputFolders;
 use manifactor_slam::variance::VarianceComponents;
 use manifactor_solve::Silent;
 use std::sync::Arc;
@@ -107,4 +111,65 @@ fn the_noise_of_boxes_is_not_that_of_their_depths() {
     let information: Vec<f64> = information.collect();
     // a box has 1/σ² below 1 in pixels
     assert!(!information.is_empty() && information.iter().all(|own| *own > 100.0), "{information:?}");
+}
+
+/// A camera that moves around a desk, with an odometry that boxes improve.
+const STREAM: &str = r#"
+source = { type = "simulated", seed = 3, scene = { objects = 10 }, trajectory = { frames = 90 },
+           odometry = { translation = 0.3, rotation = 0.3 } }
+association = { type = "likelihood" }
+detections = { loss = { type = "cauchy", scale = 2.8 } }
+variance_components = { prefix_s = 1.0 }
+"#;
+
+#[test]
+fn a_stream_trusts_its_odometry_until_its_noise_is_estimated() {
+    let document = run_of(STREAM, &[]);
+    let variant = &document.variants[0];
+    let (online, _, kept) = both(&document, variant, None);
+    let noisy: Vec<_> = kept.reports().iter().filter(|report| report.noise.is_some()).collect();
+    let [report] = noisy[..] else { panic!("{} estimates", noisy.len()) };
+    let sequence = variant.settings.source.load(&InputFolders::default()).unwrap();
+    let first = sequence.frames[0].timestamp;
+    assert!((2.0..2.1).contains(&(report.timestamp - first)), "{}", report.timestamp);
+    assert_eq!(online.online.unwrap().noise, report.noise);
+    // before it, motions are those of the odometry
+    for frame in 1..report.frame {
+        let [from, to] = [frame - 1, frame].map(|i| sequence.frames[i].world_from_camera);
+        let [live_from, live_to] = [frame - 1, frame].map(|i| kept.reports()[i].pose);
+        let apart = from.between(&to).local(&live_from.between(&live_to)).norm();
+        assert!(apart < 1e-3, "{apart} at frame {frame}");
+    }
+    // then the whole trajectory has the estimated noise
+    let settings = report.noise.as_ref().unwrap().apply_to(&variant.settings);
+    let mut last = Mapper::new(sequence.header(), &variant.settings);
+    for observation in sequence.observations().take(report.frame + 1) {
+        last.add_frame(&observation).unwrap();
+    }
+    last.set_noise(report.noise.as_ref().unwrap()).unwrap();
+    let (graph, _) = last.smoother().graph();
+    let of =
+        |name: &str| graph.factors().iter().filter(|f| f.factor.typetag_name() == name).collect::<Vec<_>>();
+    let (motions, boxes) = (of("between"), of("bounding_box"));
+    assert!(motions.len() == report.frame && boxes.len() > 100, "{} {}", motions.len(), boxes.len());
+    assert!(motions.iter().all(|motion| motion.noise == settings.odometry.noise));
+    assert!(boxes.iter().all(|seen| seen.noise == settings.detections.noise));
+    assert_eq!(last.pose_of(report.frame), Some(report.pose));
+}
+
+#[test]
+fn a_batch_assigns_boxes_with_the_noise_of_a_stream() {
+    let document = run_of(STREAM, &[]);
+    let (online, batch, kept) = both(&document, &document.variants[0], None);
+    assert!(kept.reports().iter().any(|report| report.noise.is_some()));
+    let [online, batch] = [online, batch].map(|report| report.association.unwrap().at_the_time);
+    assert_eq!(format!("{online:?}"), format!("{batch:?}"));
+}
+
+#[test]
+fn a_stream_without_objects_keeps_the_initial_noise() {
+    let document = run_of(STREAM, &["source.scene.objects=2"]);
+    let (online, _, kept) = both(&document, &document.variants[0], None);
+    assert!(kept.reports().iter().all(|report| report.noise.is_none()));
+    assert_eq!(online.online.unwrap().refusals, 0);
 }

@@ -12,9 +12,11 @@ mod components;
 mod correlation;
 mod cross_validation;
 mod motion;
+mod prefix;
 
 pub use crate::settings::{BoxGroups, VarianceSettings};
 pub use boxes::BoxComponent;
 pub use components::{VarianceComponents, VarianceError};
 pub use cross_validation::CrossValidationScore;
 pub use motion::{MotionChoice, MotionComponent};
+pub use prefix::StreamNoise;

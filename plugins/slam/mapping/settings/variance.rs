@@ -1,4 +1,4 @@
-use manifactor_graph::checked::NotNegative;
+use manifactor_graph::checked::{NotNegative, Positive};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
@@ -27,6 +27,10 @@ pub struct VarianceSettings {
     pub odometry: bool,
     /// Models odometry errors that turn about the observed scene, and not only about the camera.
     pub pivot: bool,
+    /// A stream, and the data association of a batch, estimate the noise once from the frames of this time, or
+    /// later if there are fewer than four objects. The estimate takes effect as much time later. Before it,
+    /// the odometry keeps its poses, and the noise of boxes is 10 px. Unit: seconds.
+    pub prefix_s: Positive,
 }
 
 impl Default for VarianceSettings {
@@ -40,6 +44,7 @@ impl Default for VarianceSettings {
             correlation: true,
             odometry: true,
             pivot: true,
+            prefix_s: Positive::literal(10.0),
         }
     }
 }

@@ -5,6 +5,7 @@ use super::{FrameError, Mapper, Relocalization};
 use manifactor_association::{Corrections, DetectionMove, FrameDetections, ObjectMerge};
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, Graph, Key, Manifold, Values};
+use manifactor_mapping::estimate::variance::StreamNoise;
 use manifactor_mapping::gravity::MapFrame;
 use manifactor_mapping::mapping::measurements::{FilteredDetection, ObjectBox, filter_detection};
 use manifactor_mapping::mapping::{
@@ -31,6 +32,9 @@ pub struct FrameReport {
     /// all frames. Earlier reports refer to a map that was discarded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub located: Option<Relocalization>,
+    /// The estimated noise of all frames, from this one on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<StreamNoise>,
     /// Number of boxes that passed the filters.
     pub boxes: usize,
     /// Object of each box, in the order of the frame; `None` for skipped boxes.
@@ -86,6 +90,7 @@ impl FrameReport {
             timestamp,
             pose: Se3::identity(),
             located: None,
+            noise: None,
             boxes: 0,
             box_objects: vec![],
             forgotten: vec![],
@@ -105,6 +110,7 @@ impl FrameReport {
             first.append(last);
             *last = first;
         }
+        self.noise = self.noise.take().or(before.noise);
         prepend(before.forgotten, &mut self.forgotten);
         prepend(before.moved, &mut self.moved);
         prepend(before.merged, &mut self.merged);

@@ -1,8 +1,8 @@
 //! Data association in a batch: frame by frame, then a second pass with all frames known.
 use super::RunError;
+use super::state::StreamState;
 use crate::output::report::{AssociationHistory, AssociationReport};
 use manifactor_mapping::settings::RunSettings;
-use manifactor_online::Mapper;
 use manifactor_recording::sequence::{Observation, Sequence};
 use manifactor_solve::Observer;
 use std::ops::Range;
@@ -30,7 +30,7 @@ pub(super) fn associate_sequence(
     if settings.association.uses_source_ids() {
         return Ok(AssociatedSequence { sequence, report: None });
     }
-    let mut mapper = Mapper::new(sequence.header(), settings);
+    let mut state = StreamState::new(sequence.header(), settings);
     let (mut named, mut history) = (Sequence::clone(&sequence), AssociationHistory::default());
     let mut taken = vec![];
     let (mut rejections, mut first_rejection) = (0, None);
@@ -42,7 +42,7 @@ pub(super) fn associate_sequence(
             taken.push(None);
             continue;
         }
-        match mapper.add_frame(&observation) {
+        match state.add_frame(&observation) {
             Ok(report) => {
                 history.record_frame(&observation.detections, Some(&report));
                 report.refused.iter().for_each(|refused| tracing::warn!("{refused}"));
@@ -65,6 +65,7 @@ pub(super) fn associate_sequence(
         }
         None => {}
     }
+    let mut mapper = state.mapper;
     mapper.finish_association().refused.iter().for_each(|refused| tracing::warn!("{refused}"));
     for ((observation, boxes), frame) in with_boxes(&sequence).zip(&taken) {
         if let Some(frame) = *frame {

@@ -1,5 +1,6 @@
 //! Search for the start pose in a prior map.
 use super::RunError;
+use super::state::StreamState;
 use crate::output::report::FoundStart;
 use manifactor_mapping::settings::RunSettings;
 use manifactor_online::{FrameReport, Mapper, Relocalization};
@@ -57,14 +58,14 @@ pub(super) fn find_start(
     if search.map.is_none() {
         return Ok(None);
     }
-    let mut mapper = Mapper::new(sequence.header(), settings);
+    let mut state = StreamState::new(sequence.header(), settings);
     for observation in sequence.observations() {
         if observer.poll().is_break() {
             break;
         }
         // rejected frames are reported when the sequence is mapped
-        let Ok(report) = mapper.add_frame(&observation) else { continue };
-        if let Some(located) = search.search_after_frame(&report, &mapper) {
+        let Ok(report) = state.add_frame(&observation) else { continue };
+        if let Some(located) = search.search_after_frame(&report, &state.mapper) {
             return Ok(Some(FoundStart { frame: report.frame, located }));
         }
     }

@@ -1,12 +1,13 @@
 //! Mapping of a stream while its frames arrive.
 use super::RunError;
 use super::location::StartSearch;
-use crate::output::report::{AssociationHistory, FoundStart, OnlineReport, VariantReport};
+use super::state::StreamState;
+use crate::output::report::{FoundStart, OnlineReport, VariantReport};
 use manifactor_mapping::estimate::Estimate;
 use manifactor_mapping::mapping::Warning;
 use manifactor_mapping::settings::RunSettings;
 use manifactor_online::{FrameError, FrameReport, Mapper};
-use manifactor_recording::sequence::{Observation, Sequence, SequenceHeader};
+use manifactor_recording::sequence::Observation;
 use manifactor_recording::stream::confirmed::OrderedFrames;
 use manifactor_recording::stream::{FrameStream, PrefetchedFrames};
 use manifactor_solve::Observer;
@@ -76,11 +77,8 @@ pub fn online(
     progress.add_frame_report(&taken.mapper.finish_association());
     progress.add_final_counts(&mut taken.mapper);
     watch.on_end(&mut taken.mapper);
-    let StreamState { mapper, mut sequence, association: history } = taken;
-    for (detection, name) in sequence.detections.iter_mut().zip(history.current_objects(mapper.id_changes()))
-    {
-        detection.object = name;
-    }
+    let sequence = taken.named_sequence();
+    let StreamState { mapper, association: history, .. } = taken;
     let association = history.report(&*settings.association, mapper.id_changes());
     let estimate = mapper.finish(Arc::new(sequence), observer)?;
     progress.compare_live_poses(&estimate, &settings.evaluation);
@@ -94,50 +92,6 @@ pub fn online(
     report.online = Some(progress);
     report.seconds = clock.elapsed().as_secs_f64();
     Ok((estimate, report))
-}
-
-/// The accepted frames with the map made from them.
-struct StreamState {
-    mapper: Mapper,
-    sequence: Sequence,
-    association: AssociationHistory,
-}
-
-impl StreamState {
-    fn new(opening: SequenceHeader, settings: &RunSettings) -> Self {
-        let mapper = Mapper::new(opening.clone(), settings);
-        Self { mapper, sequence: opening.into_sequence(), association: AssociationHistory::default() }
-    }
-
-    fn add_frame(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
-        let report = self.mapper.add_frame(observation)?;
-        self.association.record_frame(&observation.detections, Some(&report));
-        self.sequence.push(observation.clone());
-        Ok(report)
-    }
-
-    /// Maps the same frames with different settings. Replaces `report` by the one of the last frame, with all
-    /// changes to the new map.
-    fn remap(self, settings: &RunSettings, report: &mut FrameReport) -> Self {
-        let (mut again, mut before) = (Self::new(self.sequence.header(), settings), None);
-        let mut refused = vec![];
-        for observation in self.sequence.observations() {
-            match again.add_frame(&observation) {
-                Ok(mut taken) => {
-                    if let Some(before) = before {
-                        taken.prepend_changes(before);
-                    }
-                    before = Some(taken);
-                }
-                Err(error) => refused.push(error.to_string()),
-            }
-        }
-        if let Some(last) = before {
-            *report = last;
-        }
-        report.refused.extend(refused);
-        again
-    }
 }
 
 /// Observer of a stream of frames.

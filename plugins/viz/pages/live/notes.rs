@@ -48,6 +48,9 @@ impl Notes {
                 ),
             );
         }
+        if let Some(noise) = &report.noise {
+            self.add_note(frame, &format!("noise estimated: {noise}"));
+        }
         self.initialized += report.initialized.len();
         self.removed += report.removed.len();
         self.moved += report.moved.len();

@@ -59,11 +59,16 @@ const MAX_BOX_NOISE_CHANGE: f64 = 0.2;
 impl VarianceComponents {
     /// Returns the noise before the first round. It does not depend on the run document.
     pub(in crate::estimate) fn initial(mapping: &Mapping, settings: &VarianceSettings) -> Self {
-        let component = BoxComponent::of(INITIAL_SIGMA_PX, 0.0, 1.0, 0.0);
+        let component = Self::initial_box_noise();
         let boxes = mapping.mapped().filter(|_| settings.boxes != BoxGroups::Given);
         let boxes = boxes.map(|object| (group_name(object, settings.boxes), component)).collect();
         let is_chosen = settings.odometry && CrossValidation::is_possible(mapping);
         Self { odometry: is_chosen.then(MotionChoice::initial), boxes }
+    }
+
+    /// Returns the noise of boxes before the first round.
+    pub(super) fn initial_box_noise() -> BoxComponent {
+        BoxComponent::of(INITIAL_SIGMA_PX, 0.0, 1.0, 0.0)
     }
 
     /// Estimates the noise: of boxes from their residuals, of odometry by cross-validation with left-out

@@ -41,6 +41,10 @@ pub struct MotionChoice {
 const UNCHANGED_SIGMA: f64 = 1e-5;
 
 impl MotionComponent {
+    /// Noise with which the odometry keeps its poses.
+    pub(super) const UNCHANGED: Self =
+        Self { rotation: UNCHANGED_SIGMA, translation: UNCHANGED_SIGMA, pivot: 0.0 };
+
     /// Returns the noise of the residual (ω, v) of a motion, in the frame of the later camera: v = p × ω + ε
     /// with the pivot p.
     pub(super) fn noise(&self) -> Result<Noise, NoiseError> {
@@ -179,8 +183,7 @@ pub(super) fn choose_noise(
     }
     search.descend(1)?;
     let chosen = search.best().map(|(place, score)| {
-        let kept = MotionComponent { rotation: UNCHANGED_SIGMA, translation: UNCHANGED_SIGMA, pivot: 0.0 };
-        let noise = if score.is_better() { component(place, pivot) } else { kept };
+        let noise = if score.is_better() { component(place, pivot) } else { MotionComponent::UNCHANGED };
         MotionChoice { noise, score, place }
     });
     Ok(chosen)

@@ -3,6 +3,7 @@ use super::trajectory::{self, TrajectoryReport};
 use manifactor_formats::replay::Latencies;
 use manifactor_formats::tum::StampedPose;
 use manifactor_mapping::estimate::Estimate;
+use manifactor_mapping::estimate::variance::StreamNoise;
 use manifactor_mapping::settings::EvaluationSettings;
 use manifactor_online::{FrameError, FrameReport, Mapper};
 use serde::Serialize;
@@ -43,6 +44,9 @@ pub struct OnlineReport {
     pub cost: f64,
     /// Size of the factorization. Unit: bytes.
     pub bytes: usize,
+    /// The noise that was estimated after the first seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<StreamNoise>,
     /// Errors of the poses in `live`: one entry per alignment.
     pub trajectory: Vec<TrajectoryReport>,
 }
@@ -75,6 +79,7 @@ impl OnlineReport {
 
     /// Counts the results of a frame.
     pub(crate) fn add_frame_report(&mut self, report: &FrameReport) {
+        self.noise = report.noise.clone().or(self.noise.take());
         self.initialized += report.initialized.len();
         self.removed += report.removed.len();
         self.revised += report.revised.len();
