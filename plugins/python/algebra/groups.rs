@@ -11,6 +11,8 @@ use pyo3::prelude::*;
 use std::any::Any;
 use std::sync::Arc;
 
+type FromMatrix = Result<Arc<dyn Variable>, MatrixError>;
+
 /// A group of matrices.
 pub(super) struct Group {
     name: &'static str,
@@ -22,7 +24,7 @@ pub(super) struct Group {
     /// Returns the matrix by rows.
     matrix: fn(&dyn Any) -> Option<Vec<f64>>,
     /// Reads a matrix by rows.
-    from_matrix: fn(&[f64]) -> Result<Arc<dyn Variable>, MatrixError>,
+    from_matrix: fn(&[f64]) -> FromMatrix,
 }
 
 /// Defines a group from the type, the rows of its matrices, and the function that removes rounding errors.

@@ -13,7 +13,7 @@ PAGE = HERE.parents[2] / "docs" / "reference" / "python.md"
 #: Headings, each with its modules.
 FULL = {
     "Graphs, solves and the smoother": ["_native.pyi", "__init__.py", "batched.py"],
-    "Values": ["chosen.py", "groups.py", "algebra.py"],
+    "Values and factors": ["chosen.py", "groups.py", "algebra.py"],
     "Factors written in Python": ["traced.py", "formula.py"],
     "Runs and experiments": ["report.py", "frames.py", "logs.py"],
 }

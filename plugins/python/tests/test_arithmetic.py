@@ -46,7 +46,7 @@ for_groups = pytest.mark.parametrize("of", GROUPS, ids=lambda of: of.TYPE)
 
 @for_groups
 @given(data=st.data())
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 def test_a_group_has_the_laws_of_one(of: type[Any], data: st.DataObject) -> None:
     a, b, c = (data.draw(tangents(of)) for _ in range(3))
     x, y, z = of.exp(a), of.exp(b), of.exp(c)
@@ -70,7 +70,7 @@ def test_a_group_has_the_laws_of_one(of: type[Any], data: st.DataObject) -> None
 
 @for_groups
 @given(data=st.data())
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 def test_a_group_acts_like_its_matrix(of: type[Any], data: st.DataObject) -> None:
     x, n = of.exp(data.draw(tangents(of))), SPACE[of]
     points = np.array(data.draw(st.lists(st.lists(METRES, min_size=n, max_size=n), min_size=1, max_size=5)))
@@ -89,7 +89,7 @@ def test_a_group_acts_like_its_matrix(of: type[Any], data: st.DataObject) -> Non
 
 @for_groups
 @given(data=st.data())
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 def test_an_array_computes_like_a_loop(of: type[Any], data: st.DataObject) -> None:
     n = data.draw(st.integers(1, 4))
     a, b = (np.array([data.draw(tangents(of)) for _ in range(n)]) for _ in range(2))
@@ -146,7 +146,7 @@ def test_the_tangent_of_a_pose_has_the_rotation_first_in_space_and_last_in_the_p
 
 
 @given(data=st.data())
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 def test_rotations_agree_with_scipy(data: st.DataObject) -> None:
     rotation = pytest.importorskip("scipy.spatial.transform").Rotation
     a, b = data.draw(tangents(mf.So3)), data.draw(tangents(mf.So3))
