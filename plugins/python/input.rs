@@ -5,7 +5,7 @@ mod fields;
 mod keys;
 mod node;
 
-pub(crate) use arrays::{Numbers, array, frozen, numbers, numbers_or_nan, to_array};
+pub(crate) use arrays::{Numbers, any_numbers, array, frozen, numbers, numbers_or_nan, to_array};
 pub(crate) use columns::Columns;
 pub(crate) use fields::fields;
 pub(crate) use keys::{key, key_rows, keys};

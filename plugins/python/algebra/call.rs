@@ -9,6 +9,8 @@ use numpy::PyUntypedArrayMethods;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
+use std::collections::HashMap;
+use std::sync::OnceLock;
 
 /// An argument of a function.
 enum Argument {
@@ -77,8 +79,20 @@ impl Argument {
 /// A function with the leading axes of each argument.
 type Overload = (&'static Function, Vec<Vec<usize>>);
 
+/// Returns all functions of a name.
+fn overloads(name: &str) -> &'static [&'static Function] {
+    // a search among all functions would take longer than most calls
+    static BY_NAME: OnceLock<HashMap<&str, Vec<&Function>>> = OnceLock::new();
+    let by_name = BY_NAME.get_or_init(|| {
+        let mut by_name: HashMap<_, Vec<_>> = HashMap::new();
+        functions().into_iter().for_each(|function| by_name.entry(function.name).or_default().push(function));
+        by_name
+    });
+    by_name.get(name).map_or(&[], Vec::as_slice)
+}
+
 fn overload(name: &str, arguments: &[Argument]) -> PyResult<Overload> {
-    let all: Vec<_> = functions().into_iter().filter(|function| function.name == name).collect();
+    let all = overloads(name);
     for of_numbers in [false, true] {
         for function in all.iter().copied().filter(|function| function.arguments.len() == arguments.len()) {
             let expected = function.arguments.iter().zip(arguments);

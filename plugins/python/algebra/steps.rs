@@ -1,7 +1,7 @@
 //! Steps on manifolds: x ⊞ δ and y ⊟ x, for values and for arrays of values.
 use super::array::{Points, common_rows, into_python};
 use crate::errors;
-use crate::input::{Numbers, array, numbers, to_array};
+use crate::input::{Numbers, any_numbers, array, to_array};
 use manifactor::graph::catalogue::find;
 use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -14,17 +14,18 @@ fn dimension(name: &str) -> usize {
 
 /// Reads tangent vectors: one, shape (dim,), or one per row, shape (n, dim). A number is a vector of one.
 fn tangents(name: &str, value: &Bound<'_, PyAny>, dim: usize) -> PyResult<(Numbers, Option<usize>)> {
-    let what = "tangent vector";
-    let axes = array(what, name, value)?.shape().len();
-    if axes == 0 && dim == 1 {
-        return Ok((numbers(what, name, value, &[])?, None));
-    }
-    if axes == 2 {
-        let read = numbers(what, name, value, &[None, Some(dim)])?;
-        let rows = read.shape.first().copied();
-        return Ok((read, rows));
-    }
-    Ok((numbers(what, name, value, &[Some(dim)])?, None))
+    let array = array("retract", name, value)?;
+    let rows = match array.shape() {
+        [] if dim == 1 => None,
+        [size] if *size == dim => None,
+        [rows, size] if *size == dim => Some(*rows),
+        _ => {
+            let found = array.getattr("shape")?;
+            let message = format!("expected an array of shape ({dim},) or (n, {dim}), got {found}");
+            return Err(errors::argument("retract", name, message));
+        }
+    };
+    Ok((any_numbers("retract", name, &array)?, rows))
 }
 
 /// Returns the points that are reached along tangent vectors.

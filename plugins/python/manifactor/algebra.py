@@ -65,8 +65,8 @@ class Operators:
 def operate(name: str, a: Any, b: Any) -> Any:
     """Applies an operator to values, numbers and arrays. Other operands may define it themselves."""
     for operand in (a, b):
-        is_number = isinstance(operand, int | float | list | tuple) or hasattr(operand, "__array__")
-        if not isinstance(operand, Operators) and not is_number:
+        # an attribute of a value is looked up in its fields, which takes longer
+        if not isinstance(operand, Operators | int | float | list | tuple) and not hasattr(operand, "__array__"):
             return NotImplemented
     return _native.call(name, a, b)
 
@@ -83,15 +83,22 @@ def value_class(value: Any) -> Any:
     return class_of("variable", value.type)
 
 
+def unchangeable(array: Array) -> Array:
+    """Makes an array read-only, so that a change is an error and not lost."""
+    array.setflags(write=False)
+    return array
+
+
 def interpolated(x: Any, to: Any, t: ArrayLike) -> Any:
     """Interpolates between values or arrays of values along the tangent vector that connects them."""
     way, fraction = _native.local(x, to), np.asarray(t, dtype=float)
     if way.ndim == 1 and fraction.ndim <= 1:
         return _native.retract(x, np.multiply.outer(fraction, way))
-    if fraction.shape not in ((), (len(way),)):
-        message = f"expected a number, or one for each of {len(way)} values, got an array of shape {fraction.shape}"
-        raise ArgumentError("interpolate", [Mistake("t", message)])
-    return _native.retract(x, fraction[..., None] * way)
+    if way.ndim == 2 and fraction.shape in ((), way.shape[:1]):
+        return _native.retract(x, fraction[..., None] * way)
+    shape = "(n,)" if way.ndim == 1 else f"({len(way)},)"
+    message = f"expected a number or an array of shape {shape}, got one of shape {fraction.shape}"
+    raise ArgumentError("interpolate", [Mistake("t", message)])
 
 
 class ValueArray(Operators, _native.ValueArray, Generic[V]):
@@ -118,9 +125,9 @@ class ValueArray(Operators, _native.ValueArray, Generic[V]):
             there_are = ", ".join(of.FIELDS) or "those of `fields()`"
             raise AttributeError(f"an array of `{self.type}` has no field `{name}`: there are {there_are}")
         if name in of.FIELDS:
-            return self.numbers()[:, of.FIELDS[name]]
+            return unchangeable(self.numbers()[:, of.FIELDS[name]])
         fields = self.fields()
-        return fields[name] if name in fields else _native.call(name, self)
+        return unchangeable(fields[name]) if name in fields else _native.call(name, self)
 
     @overload
     def __getitem__(self, index: int) -> V: ...

@@ -34,6 +34,8 @@ def test_an_array_has_the_fields_and_functions_of_its_values() -> None:
     np.testing.assert_array_equal(POSES.rotation, POSES.fields()["rotation"])
     np.testing.assert_array_equal(POSES.position, POSES.translation)
     assert POSES.numbers().shape == (N, 7)
+    with pytest.raises(ValueError, match="read-only"):
+        POSES.translation[0] = 0
     planar = mf.Se2.exp(XI[:, :3])
     assert planar.angle.shape == (N,) and planar.rotation == mf.So2.exp(XI[:, 2:3])
     twists = mf.ValueArray([mf.Twist(angular=[0, 1, 2], linear=[3, 4, 5])] * 2)
@@ -104,7 +106,7 @@ WRONG: dict[str, tuple[Any, str]] = {
     "unequal points": (lambda: POSES @ np.zeros((4, 3)), r"equal leading axes, got \[5\] and \[4\]"),
     "unequal steps": (lambda: POSES.retract(np.zeros((4, 6))), "equal numbers of rows, got 5 and 4"),
     "unequal ends": (lambda: POSES.local(POSES[1:]), "equal numbers of rows, got 5 and 4"),
-    "unequal fractions": (lambda: POSES.interpolate(POSES, [0, 1]), "t: expected a number, or one for each of 5"),
+    "unequal fractions": (lambda: POSES.interpolate(POSES, [0, 1]), r"t: expected a number or an array of shape \(5,\), got one of shape \(2,\)"),
     "no group": (lambda: mf.ValueArray([mf.Point3(position=[0, 0, 0])]).inverse(), "`inverse` does not take vector3"),
     "no matrices": (lambda: mf.ValueArray([mf.Point3(position=[0, 0, 0])]).matrix(), "`point3` has no matrices.*so2, so3, se2, se3"),
     "no columns": (lambda: mf.Se3.from_fields({"translation": [0, 0, 0]}), "at least one array"),
