@@ -1,6 +1,7 @@
 //! Manifolds: vectors, rotations and poses in the plane and in space, and the trait of Lie groups.
 mod coordinates;
 mod lie_group;
+mod matrices;
 mod operators;
 mod rn;
 mod se2;
@@ -12,6 +13,7 @@ mod twist;
 
 pub use coordinates::{Coordinates, CoordinatesError};
 pub use lie_group::LieGroup;
+pub use matrices::MatrixError;
 pub use rn::{Point1, Point2, Point3, Rn};
 pub use se2::Se2;
 pub use se3::Se3;

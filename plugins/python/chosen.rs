@@ -12,6 +12,7 @@ use pyo3::exceptions::{PyAttributeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::Value as Json;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
 /// A NumPy array.
@@ -127,12 +128,19 @@ impl Chosen {
         }
     }
 
-    fn __repr__(&self) -> PyResult<String> {
+    /// The constructor with its arguments, as Python reads them.
+    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let (py, this) = (slf.py(), slf.get());
+        let name = match &this.0 {
+            What::Variable(_) => slf.get_type().name()?.to_string(),
+            other => other.names().1.to_owned(),
+        };
         // a Python function has no fields
-        let Ok(json) = self.json() else { return Ok(format!("{}(…)", self.0.names().1)) };
+        let Ok(json) = this.json() else { return Ok(format!("{name}(…)")) };
         let fields = json.as_object().into_iter().flatten().filter(|(name, _)| *name != "type");
-        let fields: Vec<_> = fields.map(|(name, value)| format!("{name}={value}")).collect();
-        Ok(format!("{}({})", self.0.names().1, fields.join(", ")))
+        let field = |(name, value)| Ok(format!("{name}={}", json_to_python(py, value)?.repr()?));
+        let fields = fields.map(field).collect::<PyResult<Vec<_>>>()?;
+        Ok(format!("{name}({})", fields.join(", ")))
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> PyResult<bool> {
@@ -157,9 +165,12 @@ impl Chosen {
     }
 
     fn __hash__(&self) -> isize {
-        use std::hash::{DefaultHasher, Hash, Hasher};
         let mut hasher = DefaultHasher::new();
         self.0.names().hash(&mut hasher);
+        // a Python function has no fields
+        if let Ok(json) = self.json() {
+            hash_json(&json, &mut hasher);
+        }
         hasher.finish() as isize
     }
 }
@@ -174,6 +185,26 @@ impl Chosen {
             What::Variable(x) => serde_json::to_value(&**x),
         };
         json.map_err(|error| errors::argument(self.0.names().1, "", error))
+    }
+}
+
+/// Hashes JSON so that equal values have equal hashes.
+fn hash_json(json: &Json, hasher: &mut impl Hasher) {
+    match json {
+        Json::Array(items) => items.iter().for_each(|item| hash_json(item, hasher)),
+        // two tables are equal in any order of their fields
+        Json::Object(fields) => {
+            let hashes = fields.iter().map(|(name, value)| {
+                let mut hasher = DefaultHasher::new();
+                name.hash(&mut hasher);
+                hash_json(value, &mut hasher);
+                hasher.finish()
+            });
+            hashes.fold(0, u64::wrapping_add).hash(hasher);
+        }
+        // 0.0 and -0.0 are equal
+        Json::Number(x) => (x.as_f64().unwrap_or_default() + 0.0).to_bits().hash(hasher),
+        other => other.hash(hasher),
     }
 }
 
@@ -242,26 +273,6 @@ argument!(variable, Variable, dyn Variable, "a value such as Se3(…)");
 
 fn variables(value: &Bound<'_, PyAny>) -> PyResult<Vec<Arc<dyn Variable>>> {
     value.try_iter()?.map(|item| variable("variables", &item?)).collect()
-}
-
-/// Returns the point that is reached along a tangent vector.
-#[pyfunction]
-fn retract<'py>(x: &Bound<'py, PyAny>, delta: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-    let point = variable("x", x)?;
-    let delta = numbers("retract", "delta", delta, &[Some(point.erased().dim())])?;
-    let moved = point.erased().retract(&delta.values).ok_or_else(|| errors::internal("retract"))?;
-    What::Variable(moved.into()).into_python(x.py())
-}
-
-/// Returns the tangent vector that leads to the point `to`.
-#[pyfunction]
-fn local<'py>(x: &Bound<'py, PyAny>, to: &Bound<'py, PyAny>) -> PyResult<Floats<'py>> {
-    let (x_point, to_point) = (variable("x", x)?, variable("to", to)?);
-    let Some(delta) = x_point.erased().local(&*to_point) else {
-        let message = format!("expected a {}, got a {}", x_point.typetag_name(), to_point.typetag_name());
-        return Err(errors::argument("local", "to", message));
-    };
-    to_array(x.py(), &[delta.len()], delta)
 }
 
 /// Returns the names of the tangent directions.
@@ -346,8 +357,6 @@ fn check_factor<'py>(
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(unpickle, module)?)?;
     module.add_function(wrap_pyfunction!(untagged, module)?)?;
-    module.add_function(wrap_pyfunction!(retract, module)?)?;
-    module.add_function(wrap_pyfunction!(local, module)?)?;
     module.add_function(wrap_pyfunction!(tangent, module)?)?;
     module.add_function(wrap_pyfunction!(linearize, module)?)?;
     module.add_function(wrap_pyfunction!(rho, module)?)?;

@@ -6,6 +6,7 @@
 // this crate reads untrusted input, so no index may be taken for granted
 #![warn(clippy::indexing_slicing)]
 #![allow(clippy::needless_pass_by_value, reason = "arguments of functions that Python calls are owned")]
+mod algebra;
 mod batch;
 mod catalogue;
 mod chosen;
@@ -34,6 +35,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<smoother::FactorId>()?;
     catalogue::register(module)?;
     chosen::register(module)?;
+    algebra::register(module)?;
     graph::register(module)?;
     solution::register(module)?;
     runs::register(module)?;

@@ -1,15 +1,15 @@
 //! Values of variables.
 use super::{Reduced, Shared, html, pickled, unpickled};
+use crate::algebra::ValueArray;
 use crate::chosen::{What, known, variable};
 use crate::errors;
-use crate::input::{Columns, key, key_rows, to_array};
+use crate::input::{Columns, fields, key, key_rows};
 use indexmap::IndexMap;
-use manifactor::graph::catalogue::find;
+use manifactor::graph::catalogue::{Entry, find};
 use manifactor::graph::{Key, Values as Inner, Variable};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
-use serde_json::Value as Json;
 use std::collections::BTreeMap;
 
 /// The values of the variables by key, in insertion order.
@@ -71,19 +71,15 @@ impl Values {
         PyList::new(py, self.0.iter().map(|(key, _)| key.as_str()))
     }
 
-    /// Inserts many values of one type.
-    #[pyo3(signature = (keys, r#type, fields, *, prefix = None))]
+    /// Inserts many values of one type, from an array of values or from a type and its fields.
+    #[pyo3(signature = (keys, r#type, fields = None, *, prefix = None))]
     fn insert_many(
         &mut self,
         keys: &Bound<'_, PyAny>,
         r#type: &Bound<'_, PyAny>,
-        fields: &Bound<'_, PyDict>,
+        fields: Option<&Bound<'_, PyDict>>,
         prefix: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let name: String = match r#type.extract() {
-            Ok(name) => name,
-            Err(_) => r#type.getattr("TYPE")?.extract()?,
-        };
         let (keys, width) = key_rows("insert_many", keys, prefix)?;
         if width != 1 {
             return Err(errors::argument(
@@ -92,17 +88,14 @@ impl Values {
                 format!("expected one key for each, got {width}"),
             ));
         }
-        known("variable", &name)?;
-        let entry = find("variable", &name).ok_or_else(|| errors::internal(&name))?;
-        let mut columns = Columns::new(&name, keys.len(), fields)?;
+        let mut rows = Rows::new(keys.len(), r#type, fields)?;
         let mut made: IndexMap<Key, Box<dyn Variable>> = IndexMap::with_capacity(keys.len());
         for (row, key) in keys.into_iter().enumerate() {
             if let Some(first) = made.get_index_of(&key) {
                 let message = format!("`{key}` is in rows {first} and {row}: expected each key once");
                 return Err(errors::argument("insert_many", "keys", message));
             }
-            let read = entry.read::<dyn Variable>(columns.row(row));
-            made.insert(key, read.map_err(|error| errors::row(&name, row, &error, "fields"))?);
+            made.insert(key, rows.row(row)?);
         }
         let values = self.0.change("values")?;
         made.into_iter().for_each(|(key, value)| drop(values.insert_boxed(key, value)));
@@ -138,20 +131,7 @@ impl Values {
         };
         known("variable", &name)?;
         let values: Vec<_> = self.0.iter().filter(|(_, value)| value.typetag_name() == name).collect();
-        let mut fields: Vec<(String, Vec<usize>, Vec<f64>)> = vec![];
-        for (_, value) in &values {
-            let json = serde_json::to_value(value).map_err(errors::internal)?;
-            let mut place = 0;
-            gather("", &json, &mut place, &mut fields);
-        }
-        let dict = PyDict::new(py);
-        for (field, shape, numbers) in fields {
-            // a field that some of the values lack is no column
-            if numbers.len() == values.len() * shape.iter().product::<usize>() {
-                let shape: Vec<_> = std::iter::once(values.len()).chain(shape).collect();
-                dict.set_item(field, to_array(py, &shape, numbers)?)?;
-            }
-        }
+        let dict = fields(py, values.iter().map(|(_, value)| *value))?;
         Ok((PyList::new(py, values.iter().map(|(key, _)| key.as_str()))?, dict))
     }
 
@@ -183,46 +163,51 @@ impl Values {
     }
 }
 
-/// Appends the numbers of a value to its fields, such as `translation` or `camera.fx`.
-fn gather(path: &str, json: &Json, place: &mut usize, fields: &mut Vec<(String, Vec<usize>, Vec<f64>)>) {
-    if let Json::Object(inner) = json {
-        for (name, value) in inner.iter().filter(|(name, _)| *name != "type") {
-            let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
-            gather(&path, value, place, fields);
-        }
-        return;
-    }
-    let Some(shape) = shape(json) else { return };
-    // fields usually have a constant order in all values
-    let found = match fields.get(*place) {
-        Some((name, ..)) if name == path => Some(*place),
-        _ => fields.iter().position(|(name, ..)| name == path),
-    };
-    let at = found.unwrap_or_else(|| {
-        fields.push((path.to_owned(), shape, vec![]));
-        fields.len() - 1
-    });
-    *place = at + 1;
-    if let Some((_, _, numbers)) = fields.get_mut(at) {
-        flatten(json, numbers);
-    }
+/// Values by row.
+enum Rows {
+    Array(ValueArray),
+    Read { entry: &'static Entry, columns: Columns },
 }
 
-/// The shape of nested arrays of numbers; `None` for anything else.
-fn shape(json: &Json) -> Option<Vec<usize>> {
-    match json {
-        Json::Number(_) => Some(vec![]),
-        Json::Array(items) => {
-            let inner = shape(items.first()?)?;
-            Some(std::iter::once(items.len()).chain(inner).collect())
+impl Rows {
+    /// Creates the rows from an array of values, or from a type and fields whose arrays are columns.
+    fn new(rows: usize, of: &Bound<'_, PyAny>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        if let Ok(array) = of.cast::<ValueArray>() {
+            let found = array.get().values.len();
+            if found != rows {
+                let message = format!("expected {rows} values, one for each key, got {found}");
+                return Err(errors::argument("insert_many", "values", message));
+            }
+            if fields.is_some() {
+                let message = "an array of values has its fields: leave them out";
+                return Err(errors::argument("insert_many", "fields", message));
+            }
+            return Ok(Self::Array(array.get().clone()));
         }
-        _ => None,
+        let name: String = match of.extract() {
+            Ok(name) => name,
+            Err(_) => of.getattr("TYPE")?.extract()?,
+        };
+        known("variable", &name)?;
+        let Some(fields) = fields else {
+            let message =
+                format!("expected the fields of a `{name}`, or an array of values in place of the type");
+            return Err(errors::argument("insert_many", "fields", message));
+        };
+        let entry = find("variable", &name).ok_or_else(|| errors::internal(&name))?;
+        Ok(Self::Read { entry, columns: Columns::new(&name, rows, fields)? })
     }
-}
 
-fn flatten(json: &Json, numbers: &mut Vec<f64>) {
-    match json {
-        Json::Array(items) => items.iter().for_each(|item| flatten(item, numbers)),
-        json => numbers.extend(json.as_f64()),
+    fn row(&mut self, row: usize) -> PyResult<Box<dyn Variable>> {
+        match self {
+            Self::Array(array) => {
+                let value = array.values.get(row).ok_or_else(|| errors::internal("insert_many"))?;
+                Ok(value.erased().clone_box())
+            }
+            Self::Read { entry, columns } => {
+                let read = entry.read::<dyn Variable>(columns.row(row));
+                read.map_err(|error| errors::row(entry.name, row, &error, "fields"))
+            }
+        }
     }
 }

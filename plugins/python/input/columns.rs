@@ -90,6 +90,10 @@ fn table(
             node
         } else if let Ok(fields) = value.cast::<PyDict>() {
             self::table(what, rows, &inner, fields, steps, columns)?
+        } else if value.hasattr("__manifactor_columns__")? {
+            // an array of values
+            let fields = value.call_method0("__manifactor_columns__")?;
+            self::table(what, rows, &inner, fields.cast()?, steps, columns)?
         } else {
             node(what, &inner, &value)?
         };

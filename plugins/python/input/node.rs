@@ -79,7 +79,7 @@ fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyR
         let items = value.try_iter()?.enumerate();
         let item = |(i, item): (usize, PyResult<_>)| nested(what, &format!("{path}[{i}]"), &item?, depth + 1);
         Value::Array(items.map(item).collect::<PyResult<_>>()?)
-    } else if value.cast::<PyUntypedArray>().is_ok() || value.hasattr("__array__")? {
+    } else if value.cast::<PyUntypedArray>().is_ok() || is_array_like(value)? {
         let array = super::array(what, path, value)?;
         let numbers = any_numbers(what, path, &array)?;
         return Ok(array_node(&place(path, ""), &numbers.shape, &numbers.values, numbers.whole));
@@ -95,6 +95,12 @@ fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyR
         return Err(errors::argument(what, path, message));
     };
     Ok(Node::new(place(path, ""), plain))
+}
+
+/// Returns true for objects that NumPy converts to an array, such as a `pandas.Series`. NumPy converts points
+/// too, but documents have their fields.
+fn is_array_like(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(value.hasattr("__array__")? && !value.hasattr("TANGENT")?)
 }
 
 /// Converts JSON from serde to a node; all parts have one place.

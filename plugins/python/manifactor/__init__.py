@@ -19,11 +19,13 @@ import os
 from . import errors, factors, functions, losses, solvers, starts, types, variables
 from ._native import FactorId, Graph, Noise, Smoother, Solution, Values, __version__, solve
 from ._native import read as _read
+from .algebra import ValueArray
 from .batched import BatchFactor, batch
 from .chosen import Factor, Loss, Solver, Start, Variable
 from .errors import ArgumentError, DocumentError, ExistsError, GraphError, ManifactorError, SolveError, TraceError
 from .factors import *
 from .formula import require, where
+from .groups import Group
 from .frames import poses, rotations, to_pandas
 from .logs import enable_logging
 from .losses import *
@@ -45,6 +47,7 @@ __all__ = [
     "FactorId",
     "Graph",
     "GraphError",
+    "Group",
     "Loss",
     "ManifactorError",
     "Noise",
@@ -58,6 +61,7 @@ __all__ = [
     "Summary",
     "TraceError",
     "TracedFactor",
+    "ValueArray",
     "Values",
     "Variable",
     "__version__",

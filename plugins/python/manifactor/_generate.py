@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import keyword
 import textwrap
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -212,47 +213,95 @@ def module(kind: str, entries: list[Schema], types: Types, variables: dict[str, 
     return HEADER.format(about=about) + imports(body, kind, types.used) + listed + "\n\n" + body + "\n"
 
 
+def base_of(entry: Schema, functions: list[Schema]) -> str:
+    """The base class of a type of variables."""
+    if entry["name"] == "so3":
+        return "SpatialRotation"
+    quantity = entry["quantity"] or ""
+    if any(f["name"] == "inverse" and f["arguments"][0][1] == quantity for f in functions):
+        return "Group"
+    return "Vector" if quantity.startswith("vector") else "Variable"
+
+
+def places_of(entry: Schema) -> str:
+    """The place of each field among the numbers of a value, found by comparison at a point without equal
+    numbers."""
+    if not entry["quantity"]:
+        return "{}"
+    example = tomllib.loads(entry["docs"].partition("```toml")[2].partition("```")[0])["values"]
+    fields = next(iter(example.values()))
+    value = _native.Chosen("variable", fields.pop("type"), fields)
+    value = _native.retract(value, [0.1 / (i + 1.7) for i in range(len(entry["tangent"]))])
+    numbers = list(_native.ValueArray([value]).numbers()[0])
+    places = []
+    for name, field in value.to_dict().items():
+        if isinstance(field, float):
+            places.append(f'"{name}": {numbers.index(field)}')
+        elif isinstance(field, list):
+            first = next(i for i in range(len(numbers)) if numbers[i : i + len(field)] == field)
+            places.append(f'"{name}": slice({first}, {first + len(field)})')
+    return "{" + ", ".join(places) + "}"
+
+
+def methods_of(entry: Schema, base: str, own: set[str], functions: list[Schema], groups: dict[str, str]) -> list[str]:
+    """Functions of formulas, as properties if they have one argument and as methods otherwise."""
+    taken = set(own) | {"sum", "where", "vector"}
+    if base in ("Group", "SpatialRotation"):
+        taken |= {"inverse", "log", "between"}
+    lines: list[str] = []
+    for function in functions:
+        name, arguments = function["name"], function["arguments"]
+        if not name.isidentifier() or name in taken or not arguments or arguments[0][1] != entry["quantity"]:
+            continue
+        if keyword.iskeyword(name):
+            continue
+        taken.add(name)
+        result = groups.get(function["result"], "Any")
+        rest = [safe(argument) for argument, _ in arguments[1:]]
+        about = docstring(one_line(function["summary"]), "        ")
+        lines += ["", *([] if rest else ["    @property"])]
+        lines += [f"    def {name}({', '.join(['self', *(f'{argument}: Any' for argument in rest)])}) -> {result}:", about]
+        ignored = "" if result == "Any" else "  # type: ignore[no-any-return]"
+        lines += [f"        return computed({', '.join(['self', json.dumps(name), *rest])}){ignored}"]
+    return lines
+
+
 def module_of_variables(entries: list[Schema], functions: list[Schema], types: Types) -> str:
     types.used = set()
     parts = []
+    bases = {entry["name"]: base_of(entry, functions) for entry in entries}
+    groups = {name: camel(name) for name, base in bases.items() if base in ("Group", "SpatialRotation")}
     for entry in entries:
         fields = parameters(entry, types, {})
-        name = camel(entry["name"])
+        name, base = camel(entry["name"]), bases[entry["name"]]
         tangent = ", ".join(f'"{direction}"' for direction in entry["tangent"])
         tangent = f"({tangent},)" if len(entry["tangent"]) == 1 else f"({tangent})"
         lines = [
-            f"class {name}(Variable):",
+            f"class {name}({base}):",
             docstring(explained(entry), "    "),
             "",
             f'    TYPE: ClassVar[str] = "{entry["name"]}"',
             f'    SHAPE: ClassVar[str] = "{entry["quantity"] or ""}"',
             f"    TANGENT: ClassVar[tuple[str, ...]] = {tangent}",
+            f"    FIELDS: ClassVar[Mapping[str, int | slice]] = {places_of(entry)}",
             "",
             signature("    def __new__(cls", fields, "Self"),
             f'        return super().__new__(cls, "variable", "{entry["name"]}", {fields_of(fields)})',
         ]
-        own = {field for field, *_ in fields}
         for field, hint, _, _ in fields:
             what = "float" if hint == "float" else "NDArray[np.float64]"
             about = one_line(entry["schema"]["properties"][field].get("description", ""))
             lines += ["", "    @property", f"    def {safe(field)}(self) -> {what}:", f'        """{about}"""']
             lines += [f'        return self.__getattr__("{field}")  # type: ignore[no-any-return]']
-        taken = [f for f in functions if f["arguments"] and f["arguments"][0][1] == entry["quantity"]]
-        for function in taken:
-            if not function["name"].isidentifier() or function["name"] in own or function["name"] == "sum":
-                continue
-            own.add(function["name"])
-            if len(function["arguments"]) == 1 and not keyword.iskeyword(function["name"]):
-                about = one_line(function["summary"])
-                lines += ["", "    @property", f"    def {function['name']}(self) -> Any:"]
-                lines += [f'        """In formulas: {about}"""', f'        return in_formulas(self, "{function["name"]}")']
+        lines += methods_of(entry, base, {field for field, *_ in fields}, functions, groups)
         parts.append("\n".join(lines))
     body = "\n\n\n".join(parts)
     named = "\n\n\n#: The class of each type of variables, by its name in documents.\nBY_TYPE: dict[str, type[Variable]] = {\n"
     named += "".join(f'    "{entry["name"]}": {camel(entry["name"])},\n' for entry in entries) + "}\n"
     head = HEADER.format(about="Every type of variables that is linked, as a class of its values.")
-    head += "\nfrom typing import Any, ClassVar, Self\n\nimport numpy as np\nfrom numpy.typing import NDArray\n"
-    head += "\nfrom .chosen import Numbers, Variable, in_formulas\n"
+    head += "\nfrom collections.abc import Mapping\nfrom typing import Any, ClassVar, Self\n"
+    head += "\nimport numpy as np\nfrom numpy.typing import NDArray\n"
+    head += "\nfrom .chosen import Numbers, Variable, computed\nfrom .groups import Group, SpatialRotation, Vector\n"
     head += "\n__all__ = [\n" + "".join(f'    "{camel(entry["name"])}",\n' for entry in entries) + "]\n"
     return head + "\n\n" + body + named
 

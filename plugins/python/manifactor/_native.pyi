@@ -1,8 +1,8 @@
 """The part of the package that is written in Rust. `manifactor` has the public names."""
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Self, TypeVar, final
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, Self, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,6 @@ from .rerun import Live
 
 __version__: str
 
-_V = TypeVar("_V", bound=Variable)
 _Array = NDArray[np.float64]
 _Keys = str | Sequence[str]
 _KeyRows = Sequence[str] | Sequence[Sequence[str]] | NDArray[Any]
@@ -31,6 +30,20 @@ class Chosen:
         """Returns the fields and the `type`, as in a document."""
     def __getattr__(self, name: str) -> Any:
         """A field, read-only: numbers as an array, nested fields as a mapping."""
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, memo: Any) -> Self: ...
+
+class ValueArray:
+    def __new__(cls, values: Iterable[Chosen] | ValueArray, type: str | type[Chosen] | None = None) -> Self: ...
+    @property
+    def type(self) -> str:
+        """Name of the type in documents."""
+    def fields(self) -> dict[str, _Array]:
+        """Returns the fields, each as an array with one row per value."""
+    def numbers(self) -> _Array:
+        """Returns the numbers of the values, as a function under `@mf.batch` gets them, shape (n, size)."""
+    def __len__(self) -> int: ...
+    def __getitem__(self, index: Any) -> Any: ...
     def __copy__(self) -> Self: ...
     def __deepcopy__(self, memo: Any) -> Self: ...
 
@@ -88,8 +101,8 @@ class Graph:
         """Adds many factors of one type, and returns the range of their indices.
 
         `factor` is a type, such as `mf.between_se3` or its name, with its `fields`: an array has one row
-        per factor, everything else is shared by all, and nested fields are dicts. A `Factor` object is used
-        for all rows. `keys` has one row per factor: texts, or an integer array, shape (n, k), whose keys
+        per factor, everything else is shared by all, and nested fields are dicts or `ValueArray`s. A `Factor`
+        object is used for all rows. `keys` has one row per factor: texts, or an integer array, shape (n, k), whose keys
         are `prefix` plus the number; there may be one prefix per column. `noise` is shared by all, or a
         dict of one of its forms with an array: `{"sigmas": array}`, shape (n, m). After an error, nothing
         is added."""
@@ -136,13 +149,14 @@ class Values:
     def insert_many(
         self,
         keys: _KeyRows,
-        type: str | type[Variable],
-        fields: Mapping[str, Any],
+        type: str | type[Variable] | ValueArray,
+        fields: Mapping[str, Any] | None = None,
         *,
         prefix: str | None = None,
     ) -> None:
-        """Inserts many values of one type: arrays among the fields have one row per value. `keys` are as
-        for `Graph.add_many`, without repetitions. Existing values of these keys are replaced."""
+        """Inserts many values of one type: a `ValueArray`, or a type and its fields, whose arrays have one
+        row per value. `keys` are as for `Graph.add_many`, without repetitions. Existing values of these keys
+        are replaced."""
     def columns(self, type: str | type[Variable]) -> tuple[list[str], dict[str, _Array]]:
         """Returns the keys and fields of all values of one type; each field is an array with one row per
         value."""
@@ -294,8 +308,13 @@ def read(
 def untagged(value: Any) -> Any: ...
 def catalogue() -> str: ...
 def functions() -> str: ...
-def retract(x: _V, delta: ArrayLike) -> _V: ...
-def local(x: Variable, to: Variable) -> _Array: ...
+def retract(x: Any, delta: ArrayLike) -> Any: ...
+def local(x: Any, to: Any) -> _Array: ...
+def call(name: str, *arguments: Any) -> Any: ...
+def identity(name: str) -> Any: ...
+def matrix(x: Any) -> _Array: ...
+def from_matrix(name: str, matrix: ArrayLike) -> Any: ...
+def array_from_fields(name: str, fields: Mapping[str, Any]) -> Any: ...
 def tangent(x: Variable) -> list[str]: ...
 def linearize(of: Factor, at: Sequence[Variable]) -> tuple[_Array, list[_Array]]: ...
 def rho(of: Loss, squared: ArrayLike) -> tuple[_Array, _Array]: ...

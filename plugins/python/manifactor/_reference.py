@@ -13,6 +13,7 @@ PAGE = HERE.parents[2] / "docs" / "reference" / "python.md"
 #: Headings, each with its modules.
 FULL = {
     "Graphs, solves and the smoother": ["_native.pyi", "__init__.py", "batched.py"],
+    "Values and factors": ["chosen.py", "groups.py", "algebra.py"],
     "Factors written in Python": ["traced.py", "formula.py"],
     "Runs and experiments": ["report.py", "frames.py", "logs.py"],
 }
@@ -33,9 +34,13 @@ HEAD = """# Python API
 """
 
 
+def is_overload(statement: ast.FunctionDef | ast.ClassDef) -> bool:
+    return any(ast.unparse(decorator) == "overload" for decorator in statement.decorator_list)
+
+
 def public(body: list[ast.stmt]) -> list[ast.FunctionDef | ast.ClassDef]:
     """Returns the public functions and classes of a module or a class, and constructors."""
-    named = [s for s in body if isinstance(s, (ast.FunctionDef, ast.ClassDef))]
+    named = [s for s in body if isinstance(s, (ast.FunctionDef, ast.ClassDef)) and not is_overload(s)]
     return [s for s in named if not s.name.startswith("_") or s.name in ("__init__", "__new__")]
 
 

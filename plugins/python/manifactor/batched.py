@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
-from .chosen import Factor
+from .algebra import ValueArray
+from .chosen import Factor, Variable
 from .errors import ArgumentError, Mistake
 from .traced import parameters
 
@@ -33,7 +34,7 @@ class BatchFactor:
         self.__doc__ = function.__doc__
         self.__wrapped__ = function
         if jacobian == "jax" or (jacobian is None and uses_jax(function)):
-            self.jacobian: Callable[..., Any] | None = by_jax(function, len(self.variables), len(self.constants))
+            self.jacobian: Callable[..., Any] | None = by_jax(function, list(self.variables.values()))
         else:
             self.jacobian = jacobian if callable(jacobian) else None
         #: Native functions by the shapes of the constants.
@@ -45,7 +46,7 @@ class BatchFactor:
 
     def __call__(self, **constants: Any) -> Factor:
         """Returns the factor with these constants: numbers or arrays."""
-        arrays = [np.asarray(value, dtype=float) for value in self._given(constants).values()]
+        arrays = [as_array(value) for value in self._given(constants).values()]
         row = np.concatenate([np.ravel(array) for array in arrays]) if arrays else np.empty(0)
         made = self._function(tuple(array.shape for array in arrays)).factor(row)
         assert isinstance(made, Factor)
@@ -56,8 +57,8 @@ class BatchFactor:
         factor."""
         arrays = []
         for name, value in self._given(dict(columns)).items():
-            array = np.asarray(value, dtype=float)
-            if not isinstance(value, np.ndarray):
+            array = as_array(value)
+            if not isinstance(value, np.ndarray | ValueArray):
                 array = np.broadcast_to(array, (rows, *array.shape))
             elif array.ndim == 0 or len(array) != rows:
                 message = f"expected an array of {rows} rows, one for each, got shape {array.shape}"
@@ -91,10 +92,11 @@ class BatchFactor:
     def _evaluate(self, shapes: tuple[tuple[int, ...], ...]) -> Callable[[list[Array], list[Array], bool], Any]:
         def evaluate(variables: list[Array], constants: list[Array], derivatives: bool) -> tuple[Any, Any]:
             given = [c.reshape(len(c), *shape) for c, shape in zip(constants, shapes, strict=True)]
-            residual = self._as_rows(self.function(*variables, *given))
+            named = [FieldArray.of(array, of) for array, of in zip(variables, self.variables.values(), strict=True)]
+            residual = self._as_rows(self.function(*named, *given))
             if not derivatives or self.jacobian is None:
                 return residual, None
-            jacobians = self.jacobian(*variables, *given)
+            jacobians = self.jacobian(*named, *given)
             if len(variables) == 1 and not isinstance(jacobians, list | tuple):
                 jacobians = [jacobians]
             return residual, [np.asarray(jacobian, dtype=float) for jacobian in jacobians]
@@ -107,6 +109,60 @@ class BatchFactor:
         return residual[:, None] if residual.ndim == 1 and self.rows == 1 else residual
 
 
+def as_array(value: Any) -> Array:
+    """Converts a constant to its numbers; the rows of an array of values are those of its numbers."""
+    if isinstance(value, ValueArray):
+        return value.numbers()
+    if isinstance(value, Variable):
+        value = ValueArray([value]).numbers()[0]
+    return np.asarray(value, dtype=float)
+
+
+class FieldArray(NDArray[np.float64]):
+    """The numbers of variables, shape (n, size), with their fields as attributes: `x.translation`."""
+
+    _fields: Mapping[str, int | slice] = {}
+
+    @classmethod
+    def of(cls, array: Array, of: type[Variable]) -> FieldArray:
+        """Names the fields of an array."""
+        named = array.view(cls)
+        named._fields = of.FIELDS
+        return named
+
+    def __getattr__(self, name: str) -> Array:
+        # parts and results have no fields
+        if name not in self._fields:
+            fields = ", ".join(self._fields) or "none"
+            raise AttributeError(f"these numbers have no field `{name}`: there are {fields}")
+        part: Array = self.view(np.ndarray)[..., self._fields[name]]
+        return part
+
+
+class JaxFields:
+    """An array of JAX, with fields as attributes like those of a `FieldArray`."""
+
+    def __init__(self, array: Any, fields: Mapping[str, int | slice]) -> None:
+        self._array, self._fields = array, fields
+
+    def __jax_array__(self) -> Any:
+        return self._array
+
+    def __getattr__(self, name: str) -> Any:
+        return self._array[..., self._fields[name]] if name in self._fields else getattr(self._array, name)
+
+
+def _delegate(name: str) -> None:
+    setattr(JaxFields, name, lambda self, *rest: getattr(self._array, name)(*rest))
+
+
+for _name in ("add", "sub", "mul", "truediv", "matmul", "pow"):
+    _delegate(f"__{_name}__")
+    _delegate(f"__r{_name}__")
+for _name in ("neg", "abs", "lt", "gt", "le", "ge", "getitem", "len", "iter"):
+    _delegate(f"__{_name}__")
+
+
 def uses_jax(function: Callable[..., Any]) -> bool:
     """Returns True if a function refers to a JAX module."""
     if "jax" not in sys.modules:
@@ -116,7 +172,7 @@ def uses_jax(function: Callable[..., Any]) -> bool:
     return any(getattr(module, "__name__", "").startswith("jax") for module in modules)
 
 
-def by_jax(function: Callable[..., Any], variables: int, constants: int) -> Callable[..., Any]:
+def by_jax(function: Callable[..., Any], variables: list[type[Variable]]) -> Callable[..., Any]:
     """Jacobians from JAX: forward mode, point by point, compiled once for each shape."""
     import jax
     import jax.numpy as jnp
@@ -124,12 +180,14 @@ def by_jax(function: Callable[..., Any], variables: int, constants: int) -> Call
     jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
 
     def one(*arguments: Any) -> Any:
-        returned = jnp.asarray(function(*(argument[None] for argument in arguments)))
+        given = [argument[None] for argument in arguments]
+        named = [JaxFields(array, of.FIELDS) for array, of in zip(given, variables, strict=False)]
+        returned = jnp.asarray(function(*named, *given[len(variables) :]))
         return jnp.atleast_1d(returned[0])
 
-    derivative = jax.vmap(jax.jacfwd(one, argnums=tuple(range(variables))))
+    derivative = jax.vmap(jax.jacfwd(one, argnums=tuple(range(len(variables)))))
     compiled: Callable[..., Any] = jax.jit(derivative)
-    return compiled
+    return lambda *arguments: compiled(*(np.asarray(argument) for argument in arguments))
 
 
 def batch(
@@ -139,12 +197,12 @@ def batch(
 
     An argument that is annotated with a type of variables receives their numbers, shape (n, size), where n
     is the number of factors: `Se3` as rotation (x, y, z, w) and translation, `DualQuadric` as its pose and
-    its semi-axes, points unchanged. All remaining arguments are constants, with one row per factor. The
+    its semi-axes, points unchanged. Fields are attributes: `x.translation`, shape (n, 3). All remaining arguments are constants, with one row per factor. The
     function returns the residuals, shape (n, rows). A NaN in a row marks the factor as undefined::
 
         @mf.batch(rows=1)
         def ranges(x: mf.Se3, p: mf.Point3, measured):
-            return np.linalg.norm(x[:, 4:] - p, axis=1) - measured
+            return np.linalg.norm(x.translation - p, axis=1) - measured
 
         graph.add_many(ranges, keys, {"measured": distances}, prefix=["x", "p"], noise=0.1)
 

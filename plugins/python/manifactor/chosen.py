@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._native import Chosen
-from .errors import Mistake, TraceError
+from .algebra import Operators, ValueArray, interpolated
+from .errors import ArgumentError, Mistake
 
 #: A sequence of numbers: a list, a tuple, or an array with one axis.
 Numbers = Sequence[float] | NDArray[Any]
@@ -59,7 +60,7 @@ class Start(Chosen):
         return super().__new__(cls, "start", name, None if fields is None else dict(fields))
 
 
-class Variable(Chosen):
+class Variable(Operators, Chosen):
     """An immutable value of a variable: a point on a manifold."""
 
     #: Name of the type in documents.
@@ -69,21 +70,13 @@ class Variable(Chosen):
     #: Names of the tangent directions, in order.
     TANGENT: ClassVar[tuple[str, ...]] = ()
 
+    #: Place of each field among the numbers that a function under `@mf.batch` gets; empty for types that it
+    #: cannot have.
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {}
+
     if TYPE_CHECKING:
         # for type checkers: operations on an argument of a traced factor or of a batch, which a value does
         # not support
-        def __add__(self, other: Any) -> Any: ...
-        def __radd__(self, other: Any) -> Any: ...
-        def __sub__(self, other: Any) -> Any: ...
-        def __rsub__(self, other: Any) -> Any: ...
-        def __mul__(self, other: Any) -> Any: ...
-        def __rmul__(self, other: Any) -> Any: ...
-        def __truediv__(self, other: Any) -> Any: ...
-        def __matmul__(self, other: Any) -> Any: ...
-        def __rmatmul__(self, other: Any) -> Any: ...
-        def __pow__(self, other: Any) -> Any: ...
-        def __neg__(self) -> Any: ...
-        def __abs__(self) -> Any: ...
         def __lt__(self, other: Any) -> Any: ...
         def __gt__(self, other: Any) -> Any: ...
         def __le__(self, other: Any) -> Any: ...
@@ -92,12 +85,45 @@ class Variable(Chosen):
         def __len__(self) -> int: ...
 
     def retract(self, delta: ArrayLike) -> Self:
-        """Returns the point reached along a tangent vector, shape (dim,)."""
-        return _native.retract(self, delta)
+        """Returns the point reached along a tangent vector, shape (dim,), or a `ValueArray` for several,
+        shape (n, dim)."""
+        return _native.retract(self, delta)  # type: ignore[no-any-return]
 
-    def local(self, to: Self) -> NDArray[np.float64]:
-        """Returns the tangent vector, shape (dim,), that leads to another point of this type."""
+    def local(self, to: Self | ValueArray[Self]) -> NDArray[np.float64]:
+        """Returns the tangent vector, shape (dim,), that leads to another point of this type, or one for each
+        point of a `ValueArray`, shape (n, dim)."""
         return _native.local(self, to)
+
+    @overload
+    def interpolate(self, to: Self, t: float) -> Self: ...
+    @overload
+    def interpolate(self, to: Self | ValueArray[Self], t: ArrayLike) -> ValueArray[Self]: ...
+    def interpolate(self, to: Any, t: ArrayLike) -> Any:
+        """Returns the point at the fraction `t` of the way to another point, x ⊞ t·(y ⊟ x): this point for 0,
+        the other for 1, and beyond them for other numbers. An array of shape (n,) gives a `ValueArray`.
+
+        A pose turns and moves at constant speed in its local frame, on a screw.
+        """
+        return interpolated(self, to, t)
+
+    @classmethod
+    def from_dict(cls, fields: Fields) -> Self:
+        """Returns the value with these fields, the inverse of `to_dict`. `type` is optional, except for
+        `Variable.from_dict`, which creates values of all types. JSON keeps all digits:
+        `Variable.from_dict(json.loads(json.dumps(x.to_dict())))` equals `x`."""
+        own = {**fields}
+        name = str(own.pop("type", cls.TYPE))
+        if cls.TYPE and name != cls.TYPE:
+            message = f"expected `{cls.TYPE}`, got {name!r}"
+            help = "`Variable.from_dict` reads all types"
+            raise ArgumentError("from_dict", [Mistake("type", message, help)])
+        return Chosen.__new__(class_of("variable", name), "variable", name, own)  # type: ignore[return-value]
+
+    @classmethod
+    def from_fields(cls, fields: Fields) -> ValueArray[Self]:
+        """Returns an array of values of this type: arrays among the fields have one row per value, as those
+        of `Values.columns`, and everything else is shared."""
+        return _native.array_from_fields(cls.TYPE, dict(fields))  # type: ignore[no-any-return]
 
 
 _CLASSES: dict[str, type[Chosen]] = {"factor": Factor, "loss": Loss, "solver": Solver, "start": Start}
@@ -112,7 +138,6 @@ def class_of(kind: str, name: str) -> type[Chosen]:
     return variables.BY_TYPE.get(name, Variable)
 
 
-def in_formulas(value: Variable, name: str) -> Any:
-    """Raises the error for attributes that a value has only in traced factors."""
-    help = "it is there in a factor that is written in Python"
-    raise TraceError("", [Mistake("", f"`{name}` is a function of formulas, and this is a value of {value.type}", help)])
+def computed(value: Variable, name: str, *rest: Any) -> Any:
+    """Computes a function of formulas for a value."""
+    return _native.call(name, value, *rest)

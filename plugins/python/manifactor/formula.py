@@ -10,11 +10,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import reduce
 from typing import Any, NoReturn
 
 import numpy as np
 
 from . import _native
+from .algebra import Operators
 from .chosen import Variable
 from .errors import Mistake, TraceError
 
@@ -44,6 +46,18 @@ def _functions() -> dict[str, dict[tuple[str, ...], Function]]:
 FUNCTIONS = _functions()
 VECTORS = {2: "vector2", 3: "vector3", 6: "vector6"}
 LENGTHS = {shape: length for length, shape in VECTORS.items()}
+#: Fields of values, as functions of formulas; a field without one is the value.
+FIELDS = {
+    ("se2", "translation"): ("position",),
+    ("se2", "angle"): ("rotation", "angle"),
+    ("se3", "translation"): ("position",),
+    ("so3", "rotation"): (),
+    ("dual_quadric", "translation"): ("centroid",),
+    **{(shape, "position"): () for shape in ("number", "vector2", "vector3")},
+    ("vector3", "direction"): (),
+}
+#: Functions that values have as methods.
+METHODS = ("inverse", "log")
 #: Longest text and deepest nesting of a part of a formula; a larger part gets a separate name.
 LONGEST, DEEPEST = 200, 12
 
@@ -128,6 +142,9 @@ class Expr:
         overloads = FUNCTIONS.get(name, {})
         if not name.isidentifier() or name.startswith("__"):
             raise AttributeError(name)
+        if (self.shape, name) in FIELDS:
+            functions = FIELDS[self.shape, name]
+            return reduce(lambda value, function: call(function, value), functions, self)
         if (self.shape,) in overloads:
             return call(name, self)
         if any(shapes[:1] == (self.shape,) for shapes in overloads):
@@ -135,6 +152,12 @@ class Expr:
         taken = [f for f, shapes in FUNCTIONS.items() if f.isidentifier() and any(s[:1] == (self.shape,) for s in shapes)]
         help = f"what takes it: {', '.join(taken)}"
         raise AttributeError(str(Mistake("", f"a {self.shape} has no `{name}`", help)))
+
+    def __call__(self) -> Expr:
+        """Returns `x.inverse` for `x.inverse()`, so that a function computes with symbols as with values."""
+        if self.name not in METHODS or not self.arguments:
+            raise TypeError(f"a {self.shape} is no function")
+        return self
 
     def __bool__(self) -> NoReturn:
         wrong("a branch cannot depend on a variable", "write mf.where(condition, a, b)")
@@ -271,9 +294,11 @@ def require(condition: Any) -> None:
 
 
 def call(name: str, *arguments: Any) -> Expr:
-    """Calls a function of formulas, chosen by the types of its arguments. Plain numbers alone are an
-    error."""
+    """Calls a function of formulas, chosen by the types of its arguments. Values are computed; plain numbers
+    alone are an error."""
     trace = next((argument.trace for argument in arguments if isinstance(argument, Expr)), None)
+    if trace is None and any(isinstance(argument, Operators) for argument in arguments):
+        return _native.call(name, *arguments)  # type: ignore[no-any-return]
     if trace is None:
         wrong(f"`{name}` is a function of formulas, and none of its arguments is of a variable", "use numpy's")
     if len(arguments) >= 2 and name == "^" and isinstance(arguments[1], Expr):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import _native
+from .algebra import ValueArray, value_class
 from .chosen import Factor, Variable
 from .errors import ManifactorError, Mistake, TraceError
 from .formula import VECTORS, Expr, Trace, Writer, wrong
@@ -42,8 +43,8 @@ def parameters(function: Callable[..., Any]) -> tuple[dict[str, type[Variable]],
 
 def shape_of(name: str, value: Any) -> str:
     """Returns the type of a constant in formulas."""
-    if isinstance(value, Variable) and value.SHAPE:
-        return value.SHAPE
+    if isinstance(value, Variable | ValueArray) and value_class(value).SHAPE:
+        return str(value_class(value).SHAPE)
     if isinstance(value, bool | str):
         wrong(f"`{name}`: expected a number, a vector or a value such as Se3(…), got {value!r}")
     axes = np.shape(value)
@@ -149,6 +150,8 @@ class TracedFactor:
 
 def plain(value: Any) -> Any:
     """Converts a constant as for a document; an array with one row per factor stays an array."""
+    if isinstance(value, ValueArray):
+        return {"type": value.type, **value.fields()}
     return value.to_dict() if isinstance(value, Variable) else value
 
 

@@ -4,12 +4,14 @@ Written by `python -m manifactor._generate` from the catalogue."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .chosen import Numbers, Variable, in_formulas
+from .chosen import Numbers, Variable, computed
+from .groups import Group, SpatialRotation, Vector
 
 __all__ = [
     "BalCamera",
@@ -56,6 +58,7 @@ class BalCamera(Variable):
     TYPE: ClassVar[str] = "bal_camera"
     SHAPE: ClassVar[str] = ""
     TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz", "x", "y", "z", "f", "k1", "k2")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {}
 
     def __new__(
         cls,
@@ -116,6 +119,7 @@ class DualQuadric(Variable):
     TYPE: ClassVar[str] = "dual_quadric"
     SHAPE: ClassVar[str] = "dual_quadric"
     TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz", "x", "y", "z", "log_a", "log_b", "log_c")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {"translation": slice(4, 7), "rotation": slice(0, 4), "semi_axes": slice(7, 10)}
 
     def __new__(cls, *, translation: Numbers, rotation: Numbers, semi_axes: Numbers) -> Self:
         return super().__new__(cls, "variable", "dual_quadric", {"translation": translation, "rotation": rotation, "semi_axes": semi_axes})
@@ -137,18 +141,22 @@ class DualQuadric(Variable):
 
     @property
     def centroid(self) -> Any:
-        """In formulas: The centre of an object."""
-        return in_formulas(self, "centroid")
+        """The centre of an object."""
+        return computed(self, "centroid")
+
+    def extent(self, u: Any) -> Any:
+        """Half the extent of an object along a unit vector u, √Σ (sₖ Rₖ · u)². The centre is this far above the lowest point."""
+        return computed(self, "extent", u)
 
     @property
     def major_axis(self) -> Any:
-        """In formulas: The unit direction of the longest semi-axis, the first of equal ones. Its sign is arbitrary."""
-        return in_formulas(self, "major_axis")
+        """The unit direction of the longest semi-axis, the first of equal ones. Its sign is arbitrary."""
+        return computed(self, "major_axis")
 
     @property
-    def pose(self) -> Any:
-        """In formulas: The pose of an object, from its local frame to the outer one."""
-        return in_formulas(self, "pose")
+    def pose(self) -> Se3:
+        """The pose of an object, from its local frame to the outer one."""
+        return computed(self, "pose")  # type: ignore[no-any-return]
 
 
 class Plane(Variable):
@@ -170,6 +178,7 @@ class Plane(Variable):
     TYPE: ClassVar[str] = "plane"
     SHAPE: ClassVar[str] = "plane"
     TANGENT: ClassVar[tuple[str, ...]] = ("a", "b", "offset")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {"normal": slice(0, 3), "offset": 3}
 
     def __new__(cls, *, normal: Numbers, offset: float) -> Self:
         return super().__new__(cls, "variable", "plane", {"normal": normal, "offset": offset})
@@ -183,6 +192,10 @@ class Plane(Variable):
     def offset(self) -> float:
         """Distance from the origin along the normal, in metres."""
         return self.__getattr__("offset")  # type: ignore[no-any-return]
+
+    def height(self, p: Any) -> Any:
+        """The height of a point above a plane, along its normal."""
+        return computed(self, "height", p)
 
 
 class Point1(Variable):
@@ -202,6 +215,7 @@ class Point1(Variable):
     TYPE: ClassVar[str] = "point1"
     SHAPE: ClassVar[str] = "number"
     TANGENT: ClassVar[tuple[str, ...]] = ("x",)
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {"position": slice(0, 1)}
 
     def __new__(cls, *, position: Numbers) -> Self:
         return super().__new__(cls, "variable", "point1", {"position": position})
@@ -213,66 +227,78 @@ class Point1(Variable):
 
     @property
     def abs(self) -> Any:
-        """In formulas: The absolute value. It has a kink at zero; the derivative for a > 0 is used there."""
-        return in_formulas(self, "abs")
+        """The absolute value. It has a kink at zero; the derivative for a > 0 is used there."""
+        return computed(self, "abs")
 
     @property
     def acos(self) -> Any:
-        """In formulas: The arccosine, in radians. Its derivative at ±1 is infinite; `angle(a, b)` has kinks only at 0 and π."""
-        return in_formulas(self, "acos")
+        """The arccosine, in radians. Its derivative at ±1 is infinite; `angle(a, b)` has kinks only at 0 and π."""
+        return computed(self, "acos")
 
     @property
     def asin(self) -> Any:
-        """In formulas: The arcsine, in radians. Its derivative at ±1 is infinite."""
-        return in_formulas(self, "asin")
+        """The arcsine, in radians. Its derivative at ±1 is infinite."""
+        return computed(self, "asin")
 
     @property
     def atan(self) -> Any:
-        """In formulas: The arctangent, in radians."""
-        return in_formulas(self, "atan")
+        """The arctangent, in radians."""
+        return computed(self, "atan")
+
+    def atan2(self, x: Any) -> Any:
+        """The angle of the vector (x, y) within -π..π, in radians."""
+        return computed(self, "atan2", x)
 
     @property
     def cos(self) -> Any:
-        """In formulas: The cosine of an angle in radians."""
-        return in_formulas(self, "cos")
+        """The cosine of an angle in radians."""
+        return computed(self, "cos")
 
     @property
     def exp(self) -> Any:
-        """In formulas: The exponential function."""
-        return in_formulas(self, "exp")
+        """The exponential function."""
+        return computed(self, "exp")
 
     @property
     def ln(self) -> Any:
-        """In formulas: The natural logarithm."""
-        return in_formulas(self, "ln")
+        """The natural logarithm."""
+        return computed(self, "ln")
+
+    def max(self, b: Any) -> Any:
+        """The larger of two numbers, the first if they are equal."""
+        return computed(self, "max", b)
+
+    def min(self, b: Any) -> Any:
+        """The smaller of two numbers, the first if they are equal."""
+        return computed(self, "min", b)
 
     @property
-    def rotation(self) -> Any:
-        """In formulas: The rotation by `angle`, in radians, counter-clockwise."""
-        return in_formulas(self, "rotation")
+    def rotation(self) -> So2:
+        """The rotation by `angle`, in radians, counter-clockwise."""
+        return computed(self, "rotation")  # type: ignore[no-any-return]
 
     @property
     def sin(self) -> Any:
-        """In formulas: The sine of an angle in radians."""
-        return in_formulas(self, "sin")
+        """The sine of an angle in radians."""
+        return computed(self, "sin")
 
     @property
     def sqrt(self) -> Any:
-        """In formulas: The square root. Its derivative at zero is infinite."""
-        return in_formulas(self, "sqrt")
+        """The square root. Its derivative at zero is infinite."""
+        return computed(self, "sqrt")
 
     @property
     def tan(self) -> Any:
-        """In formulas: The tangent of an angle in radians."""
-        return in_formulas(self, "tan")
+        """The tangent of an angle in radians."""
+        return computed(self, "tan")
 
     @property
     def wrap(self) -> Any:
-        """In formulas: The angle wrapped to -π..π, in radians."""
-        return in_formulas(self, "wrap")
+        """The angle wrapped to -π..π, in radians."""
+        return computed(self, "wrap")
 
 
-class Point2(Variable):
+class Point2(Vector):
     """A point in 2 dimensions.
 
     Tangent (x, y); x ⊞ δ = x + δ.
@@ -289,6 +315,7 @@ class Point2(Variable):
     TYPE: ClassVar[str] = "point2"
     SHAPE: ClassVar[str] = "vector2"
     TANGENT: ClassVar[tuple[str, ...]] = ("x", "y")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {"position": slice(0, 2)}
 
     def __new__(cls, *, position: Numbers) -> Self:
         return super().__new__(cls, "variable", "point2", {"position": position})
@@ -298,43 +325,67 @@ class Point2(Variable):
         """Its coordinates."""
         return self.__getattr__("position")  # type: ignore[no-any-return]
 
+    def angle(self, b: Any) -> Any:
+        """The angle from a to b, counter-clockwise, within -π..π."""
+        return computed(self, "angle", b)
+
+    def cross(self, b: Any) -> Any:
+        """The signed area of the parallelogram between two vectors."""
+        return computed(self, "cross", b)
+
+    def distance(self, b: Any) -> Any:
+        """The distance between two points. If they coincide, the derivative returned is zero."""
+        return computed(self, "distance", b)
+
+    def divide(self, b: Any) -> Any:
+        """The componentwise quotient."""
+        return computed(self, "divide", b)
+
+    def dot(self, b: Any) -> Any:
+        """The scalar product."""
+        return computed(self, "dot", b)
+
     @property
     def largest(self) -> Any:
-        """In formulas: The largest component, the first of equal ones."""
-        return in_formulas(self, "largest")
+        """The largest component, the first of equal ones."""
+        return computed(self, "largest")
+
+    def multiply(self, b: Any) -> Any:
+        """The componentwise product."""
+        return computed(self, "multiply", b)
 
     @property
     def norm(self) -> Any:
-        """In formulas: The length. It has a kink at zero; the derivative returned there is zero."""
-        return in_formulas(self, "norm")
+        """The length. It has a kink at zero; the derivative returned there is zero."""
+        return computed(self, "norm")
 
     @property
     def norm_squared(self) -> Any:
-        """In formulas: The squared length."""
-        return in_formulas(self, "norm_squared")
+        """The squared length."""
+        return computed(self, "norm_squared")
 
     @property
     def smallest(self) -> Any:
-        """In formulas: The smallest component, the first of equal ones."""
-        return in_formulas(self, "smallest")
+        """The smallest component, the first of equal ones."""
+        return computed(self, "smallest")
 
     @property
     def unit(self) -> Any:
-        """In formulas: The vector, normalized to length one."""
-        return in_formulas(self, "unit")
+        """The vector, normalized to length one."""
+        return computed(self, "unit")
 
     @property
     def x(self) -> Any:
-        """In formulas: The first component."""
-        return in_formulas(self, "x")
+        """The first component."""
+        return computed(self, "x")
 
     @property
     def y(self) -> Any:
-        """In formulas: The second component."""
-        return in_formulas(self, "y")
+        """The second component."""
+        return computed(self, "y")
 
 
-class Point3(Variable):
+class Point3(Vector):
     """A point in 3 dimensions.
 
     Tangent (x, y, z); x ⊞ δ = x + δ.
@@ -351,6 +402,7 @@ class Point3(Variable):
     TYPE: ClassVar[str] = "point3"
     SHAPE: ClassVar[str] = "vector3"
     TANGENT: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {"position": slice(0, 3)}
 
     def __new__(cls, *, position: Numbers) -> Self:
         return super().__new__(cls, "variable", "point3", {"position": position})
@@ -362,66 +414,90 @@ class Point3(Variable):
 
     @property
     def abs(self) -> Any:
-        """In formulas: The absolute value of each component."""
-        return in_formulas(self, "abs")
+        """The absolute value of each component."""
+        return computed(self, "abs")
+
+    def angle(self, b: Any) -> Any:
+        """The angle between two vectors, 0 to π. It has a kink at both ends; the derivative returned there is zero."""
+        return computed(self, "angle", b)
+
+    def cross(self, b: Any) -> Any:
+        """The cross product."""
+        return computed(self, "cross", b)
+
+    def distance(self, b: Any) -> Any:
+        """The distance between two points. If they coincide, the derivative returned is zero."""
+        return computed(self, "distance", b)
+
+    def divide(self, b: Any) -> Any:
+        """The componentwise quotient."""
+        return computed(self, "divide", b)
+
+    def dot(self, b: Any) -> Any:
+        """The scalar product."""
+        return computed(self, "dot", b)
 
     @property
     def largest(self) -> Any:
-        """In formulas: The largest component, the first of equal ones."""
-        return in_formulas(self, "largest")
+        """The largest component, the first of equal ones."""
+        return computed(self, "largest")
 
     @property
     def ln(self) -> Any:
-        """In formulas: The logarithm of each component."""
-        return in_formulas(self, "ln")
+        """The logarithm of each component."""
+        return computed(self, "ln")
+
+    def multiply(self, b: Any) -> Any:
+        """The componentwise product."""
+        return computed(self, "multiply", b)
 
     @property
     def norm(self) -> Any:
-        """In formulas: The length. It has a kink at zero; the derivative returned there is zero."""
-        return in_formulas(self, "norm")
+        """The length. It has a kink at zero; the derivative returned there is zero."""
+        return computed(self, "norm")
 
     @property
     def norm_squared(self) -> Any:
-        """In formulas: The squared length."""
-        return in_formulas(self, "norm_squared")
+        """The squared length."""
+        return computed(self, "norm_squared")
 
     @property
     def project(self) -> Any:
-        """In formulas: The projection (x, y)/z of a point in the frame of a camera that looks along z."""
-        return in_formulas(self, "project")
+        """The projection (x, y)/z of a point in the frame of a camera that looks along z."""
+        return computed(self, "project")
 
     @property
-    def rotation(self) -> Any:
-        """In formulas: The rotation about the vector `omega` by its length, in radians."""
-        return in_formulas(self, "rotation")
+    def rotation(self) -> So3:
+        """The rotation about the vector `omega` by its length, in radians."""
+        return computed(self, "rotation")  # type: ignore[no-any-return]
 
     @property
     def smallest(self) -> Any:
-        """In formulas: The smallest component, the first of equal ones."""
-        return in_formulas(self, "smallest")
+        """The smallest component, the first of equal ones."""
+        return computed(self, "smallest")
 
     @property
     def unit(self) -> Any:
-        """In formulas: The vector, normalized to length one."""
-        return in_formulas(self, "unit")
+        """The vector, normalized to length one."""
+        return computed(self, "unit")
 
     @property
     def x(self) -> Any:
-        """In formulas: The first component."""
-        return in_formulas(self, "x")
+        """The first component."""
+        return computed(self, "x")
 
     @property
     def y(self) -> Any:
-        """In formulas: The second component."""
-        return in_formulas(self, "y")
+        """The second component."""
+        return computed(self, "y")
 
     @property
     def z(self) -> Any:
-        """In formulas: The third component."""
-        return in_formulas(self, "z")
+        """The third component."""
+        return computed(self, "z")
 
 
-class S2(Variable):
+class S2(Vector):
     """A direction in space, such as gravity: a point on the unit sphere.
 
     Tangent (a, b): along two axes perpendicular to the direction n, B(n) = [b₁ b₂] of Duff et al., *Building
@@ -440,6 +516,7 @@ class S2(Variable):
     TYPE: ClassVar[str] = "s2"
     SHAPE: ClassVar[str] = "vector3"
     TANGENT: ClassVar[tuple[str, ...]] = ("a", "b")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {"direction": slice(0, 3)}
 
     def __new__(cls, *, direction: Numbers) -> Self:
         return super().__new__(cls, "variable", "s2", {"direction": direction})
@@ -451,66 +528,90 @@ class S2(Variable):
 
     @property
     def abs(self) -> Any:
-        """In formulas: The absolute value of each component."""
-        return in_formulas(self, "abs")
+        """The absolute value of each component."""
+        return computed(self, "abs")
+
+    def angle(self, b: Any) -> Any:
+        """The angle between two vectors, 0 to π. It has a kink at both ends; the derivative returned there is zero."""
+        return computed(self, "angle", b)
+
+    def cross(self, b: Any) -> Any:
+        """The cross product."""
+        return computed(self, "cross", b)
+
+    def distance(self, b: Any) -> Any:
+        """The distance between two points. If they coincide, the derivative returned is zero."""
+        return computed(self, "distance", b)
+
+    def divide(self, b: Any) -> Any:
+        """The componentwise quotient."""
+        return computed(self, "divide", b)
+
+    def dot(self, b: Any) -> Any:
+        """The scalar product."""
+        return computed(self, "dot", b)
 
     @property
     def largest(self) -> Any:
-        """In formulas: The largest component, the first of equal ones."""
-        return in_formulas(self, "largest")
+        """The largest component, the first of equal ones."""
+        return computed(self, "largest")
 
     @property
     def ln(self) -> Any:
-        """In formulas: The logarithm of each component."""
-        return in_formulas(self, "ln")
+        """The logarithm of each component."""
+        return computed(self, "ln")
+
+    def multiply(self, b: Any) -> Any:
+        """The componentwise product."""
+        return computed(self, "multiply", b)
 
     @property
     def norm(self) -> Any:
-        """In formulas: The length. It has a kink at zero; the derivative returned there is zero."""
-        return in_formulas(self, "norm")
+        """The length. It has a kink at zero; the derivative returned there is zero."""
+        return computed(self, "norm")
 
     @property
     def norm_squared(self) -> Any:
-        """In formulas: The squared length."""
-        return in_formulas(self, "norm_squared")
+        """The squared length."""
+        return computed(self, "norm_squared")
 
     @property
     def project(self) -> Any:
-        """In formulas: The projection (x, y)/z of a point in the frame of a camera that looks along z."""
-        return in_formulas(self, "project")
+        """The projection (x, y)/z of a point in the frame of a camera that looks along z."""
+        return computed(self, "project")
 
     @property
-    def rotation(self) -> Any:
-        """In formulas: The rotation about the vector `omega` by its length, in radians."""
-        return in_formulas(self, "rotation")
+    def rotation(self) -> So3:
+        """The rotation about the vector `omega` by its length, in radians."""
+        return computed(self, "rotation")  # type: ignore[no-any-return]
 
     @property
     def smallest(self) -> Any:
-        """In formulas: The smallest component, the first of equal ones."""
-        return in_formulas(self, "smallest")
+        """The smallest component, the first of equal ones."""
+        return computed(self, "smallest")
 
     @property
     def unit(self) -> Any:
-        """In formulas: The vector, normalized to length one."""
-        return in_formulas(self, "unit")
+        """The vector, normalized to length one."""
+        return computed(self, "unit")
 
     @property
     def x(self) -> Any:
-        """In formulas: The first component."""
-        return in_formulas(self, "x")
+        """The first component."""
+        return computed(self, "x")
 
     @property
     def y(self) -> Any:
-        """In formulas: The second component."""
-        return in_formulas(self, "y")
+        """The second component."""
+        return computed(self, "y")
 
     @property
     def z(self) -> Any:
-        """In formulas: The third component."""
-        return in_formulas(self, "z")
+        """The third component."""
+        return computed(self, "z")
 
 
-class Se2(Variable):
+class Se2(Group):
     """A pose in the plane, X·Exp(v, θ): tangent (x, y, theta), in metres and radians, in the local frame.
 
     It maps points from the local frame to the outer one: R p + t. The angle is in radians, counter-clockwise.
@@ -528,6 +629,7 @@ class Se2(Variable):
     TYPE: ClassVar[str] = "se2"
     SHAPE: ClassVar[str] = "se2"
     TANGENT: ClassVar[tuple[str, ...]] = ("x", "y", "theta")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {"translation": slice(3, 5), "angle": 0}
 
     def __new__(cls, *, translation: Numbers, angle: float) -> Self:
         return super().__new__(cls, "variable", "se2", {"translation": translation, "angle": angle})
@@ -543,27 +645,17 @@ class Se2(Variable):
         return self.__getattr__("angle")  # type: ignore[no-any-return]
 
     @property
-    def inverse(self) -> Any:
-        """In formulas: The inverse pose: `inverse(x) * p` is the point p in the frame of x."""
-        return in_formulas(self, "inverse")
-
-    @property
-    def log(self) -> Any:
-        """In formulas: The tangent vector (v, θ) from the identity to the pose."""
-        return in_formulas(self, "log")
-
-    @property
     def position(self) -> Any:
-        """In formulas: The position of a pose."""
-        return in_formulas(self, "position")
+        """The position of a pose."""
+        return computed(self, "position")
 
     @property
-    def rotation(self) -> Any:
-        """In formulas: The rotation of a pose."""
-        return in_formulas(self, "rotation")
+    def rotation(self) -> So2:
+        """The rotation of a pose."""
+        return computed(self, "rotation")  # type: ignore[no-any-return]
 
 
-class Se3(Variable):
+class Se3(Group):
     """A pose in space, X·Exp(ω, v): tangent (rx, ry, rz, x, y, z), in radians and metres, in the local frame.
 
     It maps points from the local frame to the outer one: R p + t. The rotation is a unit quaternion (x, y, z,
@@ -582,6 +674,7 @@ class Se3(Variable):
     TYPE: ClassVar[str] = "se3"
     SHAPE: ClassVar[str] = "se3"
     TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz", "x", "y", "z")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {"translation": slice(4, 7), "rotation": slice(0, 4)}
 
     def __new__(cls, *, translation: Numbers, rotation: Numbers) -> Self:
         return super().__new__(cls, "variable", "se3", {"translation": translation, "rotation": rotation})
@@ -597,22 +690,12 @@ class Se3(Variable):
         return self.__getattr__("rotation")  # type: ignore[no-any-return]
 
     @property
-    def inverse(self) -> Any:
-        """In formulas: The inverse pose: `inverse(x) * p` is the point p in the frame of x."""
-        return in_formulas(self, "inverse")
-
-    @property
-    def log(self) -> Any:
-        """In formulas: The tangent vector (ω, v) from the identity to the pose."""
-        return in_formulas(self, "log")
-
-    @property
     def position(self) -> Any:
-        """In formulas: The position of a pose."""
-        return in_formulas(self, "position")
+        """The position of a pose."""
+        return computed(self, "position")
 
 
-class So2(Variable):
+class So2(Group):
     """A rotation in the plane: tangent (theta), in radians, counter-clockwise.
 
     The angle is in -π..π. The logarithm is this angle and jumps from one end to the other.
@@ -629,6 +712,7 @@ class So2(Variable):
     TYPE: ClassVar[str] = "so2"
     SHAPE: ClassVar[str] = "so2"
     TANGENT: ClassVar[tuple[str, ...]] = ("theta",)
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {"angle": 0}
 
     def __new__(cls, *, angle: float) -> Self:
         return super().__new__(cls, "variable", "so2", {"angle": angle})
@@ -638,23 +722,22 @@ class So2(Variable):
         """Angle in radians, counter-clockwise."""
         return self.__getattr__("angle")  # type: ignore[no-any-return]
 
-    @property
-    def inverse(self) -> Any:
-        """In formulas: The inverse rotation."""
-        return in_formulas(self, "inverse")
+    def pose(self, position: Any) -> Se2:
+        """The pose with this rotation and this position."""
+        return computed(self, "pose", position)  # type: ignore[no-any-return]
 
     @property
     def x_axis(self) -> Any:
-        """In formulas: The x axis of the rotated frame."""
-        return in_formulas(self, "x_axis")
+        """The x axis of the rotated frame."""
+        return computed(self, "x_axis")
 
     @property
     def y_axis(self) -> Any:
-        """In formulas: The y axis of the rotated frame."""
-        return in_formulas(self, "y_axis")
+        """The y axis of the rotated frame."""
+        return computed(self, "y_axis")
 
 
-class So3(Variable):
+class So3(SpatialRotation):
     """A rotation in space, R·Exp(ω): tangent (rx, ry, rz), in radians, about the axes of the rotated frame.
 
     Read from a quaternion (x, y, z, w) of length 1 to within 0.001, and normalized. The logarithm is the
@@ -672,6 +755,7 @@ class So3(Variable):
     TYPE: ClassVar[str] = "so3"
     SHAPE: ClassVar[str] = "so3"
     TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {"rotation": slice(0, 4)}
 
     def __new__(cls, *, rotation: Numbers) -> Self:
         return super().__new__(cls, "variable", "so3", {"rotation": rotation})
@@ -681,30 +765,24 @@ class So3(Variable):
         """Unit quaternion (x, y, z, w)."""
         return self.__getattr__("rotation")  # type: ignore[no-any-return]
 
-    @property
-    def inverse(self) -> Any:
-        """In formulas: The inverse rotation."""
-        return in_formulas(self, "inverse")
-
-    @property
-    def log(self) -> Any:
-        """In formulas: The shortest rotation vector, of length π at most, in radians."""
-        return in_formulas(self, "log")
+    def pose(self, position: Any) -> Se3:
+        """The pose with this rotation and this position."""
+        return computed(self, "pose", position)  # type: ignore[no-any-return]
 
     @property
     def x_axis(self) -> Any:
-        """In formulas: The x axis of the rotated frame."""
-        return in_formulas(self, "x_axis")
+        """The x axis of the rotated frame."""
+        return computed(self, "x_axis")
 
     @property
     def y_axis(self) -> Any:
-        """In formulas: The y axis of the rotated frame."""
-        return in_formulas(self, "y_axis")
+        """The y axis of the rotated frame."""
+        return computed(self, "y_axis")
 
     @property
     def z_axis(self) -> Any:
-        """In formulas: The z axis of the rotated frame."""
-        return in_formulas(self, "z_axis")
+        """The z axis of the rotated frame."""
+        return computed(self, "z_axis")
 
 
 class Twist(Variable):
@@ -725,6 +803,7 @@ class Twist(Variable):
     TYPE: ClassVar[str] = "twist"
     SHAPE: ClassVar[str] = ""
     TANGENT: ClassVar[tuple[str, ...]] = ("wx", "wy", "wz", "vx", "vy", "vz")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {}
 
     def __new__(cls, *, angular: Numbers, linear: Numbers) -> Self:
         return super().__new__(cls, "variable", "twist", {"angular": angular, "linear": linear})

@@ -139,7 +139,7 @@ def test_single_values() -> None:
     with pytest.raises(mf.ArgumentError, match="translation.*`NaN` is not a finite number"):
         mf.Se3(translation=[0, np.nan, 0], rotation=[0, 0, 0, 1])
     x = mf.Point2(position=[0, 0])
-    with pytest.raises(mf.ArgumentError, match=r"delta: expected an array of shape \(2,\), got \(3,\)"):
+    with pytest.raises(mf.ArgumentError, match=r"delta: expected an array of shape \(2,\) or \(n, 2\), got \(3,\)"):
         x.retract(np.zeros(3))
     with pytest.raises(mf.ArgumentError, match="to: expected a point2, got a point1"):
         x.local(mf.Point1(position=[0]))  # type: ignore[arg-type]

@@ -49,7 +49,7 @@ def test_it_says_what_the_built_in_factor_says(at: np.ndarray[Any, Any]) -> None
 
 @mf.factor
 def everything(x: mf.Se3, p: mf.Point3, gain: Any, offset: Any, body: Any = (0.1, 0.2, 0.3)) -> Any:
-    seen = x.inverse * (p + body)
+    seen = x.inverse() * (p + body)
     far = np.linalg.norm(seen)
     u, v, w = seen
     flat = np.where(far > 2, far, 2 + (far - 2) * gain)
@@ -175,7 +175,7 @@ def test_a_pose_as_a_constant() -> None:
 def test_a_domain() -> None:
     @mf.factor
     def in_front(x: mf.Se3, p: mf.Point3) -> Any:
-        seen = x.inverse * p
+        seen = x.inverse * p  # the attribute is a symbol too
         mf.require(seen[2] > 0.1)
         return fn.project(seen)
 

@@ -132,7 +132,7 @@ def test_values_are_a_mapping() -> None:
 def test_chosen_things_are_values() -> None:
     a, b = mf.Se2(translation=[1, 2], angle=0.5), mf.Se2(translation=np.array([1, 2]), angle=0.5)
     assert a == b and hash(a) == hash(b) and a != mf.Se2(translation=[1, 2], angle=0.6)
-    assert repr(a) == "se2(translation=[1.0,2.0], angle=0.5)"
+    assert repr(a) == "Se2(translation=[1.0, 2.0], angle=0.5)"
     assert a.to_dict() == {"type": "se2", "translation": [1.0, 2.0], "angle": 0.5}
     with pytest.raises(AttributeError, match="has no field `heading`: there are"):
         a.heading  # noqa: B018
