@@ -23,8 +23,9 @@ use std::time::{Duration, Instant};
 ///
 /// The document and the results are the same as for `manifactor run`. In addition, live.txt holds the poses
 /// as estimated when their frames arrived, and latency.svg the time of each frame. An object is added to
-/// the map as soon as it can be initialized. The noise stays as given until the end. The settings of the
-/// smoother are in the table `online` of the document.
+/// the map as soon as it can be initialized. With `variance_components`, the noise is estimated from the
+/// first seconds, and again from all data at the end. The settings of the smoother are in the table `online`
+/// of the document.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  manifactor online examples/desk/desk.toml --out out/online --every 50")]
 pub(crate) struct Online {

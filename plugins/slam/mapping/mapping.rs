@@ -237,6 +237,9 @@ impl Mapping {
 /// leave the image.
 const MAX_OUTSIDE_SHARE: f64 = 0.05;
 
+/// Normalized sides are this far outside of the image at most: centre and size of a box are rounded.
+const NORMALIZED_MARGIN: f64 = 0.01;
+
 /// Returns a warning if boxes do not fit the image of the camera.
 fn image_warning(sequence: &Sequence) -> Option<Warning> {
     let (width, height) = (sequence.camera.width, sequence.camera.height);
@@ -245,7 +248,8 @@ fn image_warning(sequence: &Sequence) -> Option<Warning> {
         boxes.filter(|b| b.xmin < b.xmax && b.ymin < b.ymax)
     };
     let boxes = all().count();
-    let is_normalized = |b: &BoundingBox| b.xmin >= 0.0 && b.ymin >= 0.0 && b.xmax <= 1.0 && b.ymax <= 1.0;
+    let is_share = |side: f64| (-NORMALIZED_MARGIN..=1.0 + NORMALIZED_MARGIN).contains(&side);
+    let is_normalized = |b: &BoundingBox| [b.xmin, b.ymin, b.xmax, b.ymax].into_iter().all(is_share);
     if boxes > 0 && all().all(is_normalized) {
         return Some(Warning::NormalizedBoxes { boxes, image: [width, height] });
     }
@@ -309,7 +313,8 @@ fn not_mapped_warnings<'a>(objects: impl Iterator<Item = (&'a MappedObject, &'a 
             more => format!(" and {more} more"),
         };
         let named = keys.iter().take(MAX_LISTED_OBJECTS).map(String::as_str).collect::<Vec<_>>().join(", ");
-        let what = format!("{named}{more}: {rejection}");
+        let first = if keys.len() > 1 { "; the first: " } else { ": " };
+        let what = format!("{named}{more}{first}{rejection}");
         Warning::NotMapped { what, remedy: rejection.remedy() }
     };
     kinds.into_iter().map(warning).collect()

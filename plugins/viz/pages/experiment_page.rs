@@ -1,7 +1,7 @@
 //! The page of an experiment: means, comparisons, distributions, curves, and every trial.
 use crate::canvas::Ink;
 use crate::drawing::{Chart, Curve, Distribution, Intervals, Mean, Picture, figure};
-use crate::pages::page::{Page, VALUES};
+use crate::pages::page::{PRINT, Page, VALUES};
 use crate::pages::run_page::{WIDTH, version};
 use manifactor_formats::table::{DataColumn, DataTable};
 use manifactor_slam::experiment::{Experiment, ExperimentSummary};
@@ -111,6 +111,7 @@ pub fn experiment_page(
     page.heading("Config");
     page.folded("The experiment", config);
     page.own("", VALUES);
+    page.own("", PRINT);
     page.html()
 }
 

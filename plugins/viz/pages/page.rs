@@ -21,6 +21,8 @@ pub(crate) struct Page {
 const STYLE: &str = include_str!("assets/page.css");
 /// Script that shows the values of charts under the pointer. A page with charts adds it.
 pub(super) const VALUES: &str = include_str!("assets/values.js");
+/// Script that opens folded sections for printing.
+pub(super) const PRINT: &str = include_str!("assets/print.js");
 /// Content security policy: run the embedded code, and fetch nothing.
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";

@@ -1,5 +1,5 @@
 //! The page of a run: the map in 3D, its variants side by side, and the factors of each object.
-use super::page::{Page, VALUES};
+use super::page::{PRINT, Page, VALUES};
 use super::run_tables::{held_out, noise, objects, overview, own_variables, words};
 use super::{verdict::verdict, viewer};
 use crate::drawing::{Palette, Picture, Scene, Viewpoint, map};
@@ -55,6 +55,7 @@ pub fn run_page(report: &RunReport, record: &RunRecord, configs: &[String]) -> S
     }
     page.heading("Files").files(&["report.json".to_owned(), "record.json".to_owned()]);
     page.own("", VALUES);
+    page.own("", PRINT);
     page.paragraph(&version());
     page.html()
 }

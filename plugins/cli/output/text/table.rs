@@ -1,6 +1,6 @@
 //! Tables for any width from 60 columns on; no number and no name is ever broken.
 //!
-//! A table of numbers that is too wide keeps the columns of highest priority that fit, and lists the hidden
+//! A table of numbers leaves out columns without any number. One that is too wide keeps the columns of highest priority that fit, and lists the hidden
 //! ones. A table of words wraps its last column. If that is not enough, rows are turned: a name, and below
 //! it one line for each cell.
 use super::{on_one_line, width, wrapped};
@@ -104,11 +104,15 @@ impl Table {
         cells.max().unwrap_or(0).max(head)
     }
 
-    /// Returns `None` if not even the first column of numbers fits next to the names.
+    /// Returns `None` if not even the first column of numbers fits next to the names. Columns without a number
+    /// are left out.
     fn numbers(&self, by_priority: &[usize], names: usize, width: usize) -> Option<Vec<String>> {
         let mut shown = vec![0];
         let mut taken = self.column_width(0);
-        for column in by_priority {
+        let is_empty = |column: usize| {
+            column >= names && self.rows.iter().all(|row| matches!(Self::cell(row, column), "" | "-"))
+        };
+        for column in by_priority.iter().filter(|column| !is_empty(**column)) {
             let wide = self.column_width(*column) + GAP;
             if taken + wide <= width {
                 taken += wide;
@@ -137,7 +141,7 @@ impl Table {
         lines.push(rule.clone());
         lines.extend(self.rows.iter().map(|row| line(&|column| Self::cell(row, column).to_owned())));
         lines.push(rule);
-        let hidden = (0..self.header.len()).filter(|column| !shown.contains(column));
+        let hidden = (0..self.header.len()).filter(|column| !shown.contains(column) && !is_empty(*column));
         let hidden: Vec<&str> = hidden.map(|column| self.head(column)[0]).collect();
         if !hidden.is_empty() {
             lines.extend(wrapped(&format!("Not shown at this width: {}.", hidden.join(", ")), width));

@@ -22,6 +22,14 @@ use serde::Serialize;
 /// A box of a stalled fit is removed if it overlaps less with the ellipsoid (intersection over union).
 const MIN_BOX_OVERLAP: f64 = 0.1;
 
+/// Share of boxes without an ellipsoid that explains them, above which the poses or the camera are probably
+/// wrong. On recordings with correct poses it is below 0.02. In a simulated recording with quaternions in the
+/// wrong order, poses of the body, inverted poses or wrong intrinsics, it is 0.23 to 0.57.
+const MAX_UNEXPLAINED: f64 = 0.2;
+/// The limit for less than `FEW_BOXES` boxes, where a single object may have a fifth of them.
+const MAX_UNEXPLAINED_OF_FEW: f64 = 0.5;
+const FEW_BOXES: usize = 200;
+
 /// Result of the second stage.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct CompletionOutcome {
@@ -64,10 +72,8 @@ impl Estimate {
         let settings = settings.of_completion();
         let FittedObjects { mut mapping, values, stalled, interrupted } =
             self.fit_objects(&settings, observer)?;
-        let misfits = mapping.objects.iter().filter(|object| is_misfit(object)).count();
-        let fitted = misfits + mapping.mapped().count();
-        let warning = (2 * misfits > fitted).then_some(Warning::PosesMisfit { misfits, fitted });
-        if misfits == fitted {
+        let warning = misfit_warning(&mapping);
+        if mapping.mapped().next().is_none() {
             self.mapping.warnings.extend(warning);
             return Ok(self);
         }
@@ -264,8 +270,25 @@ fn connected_objects(mapping: &Mapping) -> Vec<(Vec<&Key>, Vec<&FactorEntry>)> {
     groups.into_values().collect()
 }
 
-fn is_misfit(object: &MappedObject) -> bool {
-    matches!(object.rejected, Some(Rejection::Misfit { .. }))
+/// Returns a warning if too many boxes belong to objects without an ellipsoid that explains them.
+fn misfit_warning(mapping: &Mapping) -> Option<Warning> {
+    let boxes = |of: &dyn Fn(&MappedObject) -> bool| -> usize {
+        mapping.objects.iter().filter(|object| of(object)).map(|object| object.boxes).sum()
+    };
+    let (unexplained, mapped) = (boxes(&is_unexplained), boxes(&|object| object.rejected.is_none()));
+    let boxes = unexplained + mapped;
+    let limit = if boxes < FEW_BOXES { MAX_UNEXPLAINED_OF_FEW } else { MAX_UNEXPLAINED };
+    (unexplained as f64 > limit * boxes as f64).then_some(Warning::PosesMisfit { unexplained, boxes })
+}
+
+fn is_unexplained(object: &MappedObject) -> bool {
+    let fits_badly = |rejection: &Rejection| {
+        matches!(
+            rejection,
+            Rejection::Misfit { .. } | Rejection::Stalled { .. } | Rejection::Initialisation { .. }
+        )
+    };
+    object.rejected.as_ref().is_some_and(fits_badly)
 }
 
 /// Returns the intersection over union of a box with the visible part of an ellipsoid's outline.

@@ -90,7 +90,10 @@ impl Rejection {
 impl fmt::Display for Rejection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Views { views, least } => write!(f, "{views} boxes, at least {least} are needed"),
+            Self::Views { views, least } => {
+                let boxes = if *views == 1 { "box" } else { "boxes" };
+                write!(f, "{views} {boxes}, at least {least} are needed")
+            }
             Self::BoxDeviation { deviation_px, limit_px } => {
                 write!(
                     f,
@@ -114,7 +117,7 @@ impl fmt::Display for Rejection {
             Self::Stalled { termination } => write!(f, "no ellipsoid is found for its boxes: {termination}"),
             Self::Misfit { overlap, limit } => write!(
                 f,
-                "its boxes and its ellipsoid overlap by {:.0} % (median), at least {:.0} % are needed: they show several objects",
+                "its boxes and its ellipsoid overlap by {:.0} % (median), at least {:.0} % are needed: they show several objects, or the poses are wrong",
                 100.0 * overlap,
                 100.0 * limit
             ),

@@ -75,13 +75,13 @@ pub enum Warning {
         /// Standard deviation of the translation. Unit: metres.
         translation: f64,
     },
-    /// More than half of the fitted ellipsoids do not explain their boxes, so poses or camera are probably
+    /// Too many boxes belong to objects without an ellipsoid that explains them, so poses or camera are probably
     /// wrong.
     PosesMisfit {
-        /// Number of such ellipsoids.
-        misfits: usize,
-        /// Number of fitted ellipsoids.
-        fitted: usize,
+        /// Number of such boxes.
+        unexplained: usize,
+        /// Number of these boxes and those of mapped objects.
+        boxes: usize,
     },
     /// The map has no objects.
     NoObjects {
@@ -163,7 +163,7 @@ impl fmt::Display for Warning {
             }
             Self::Unused { what } => f.write_str(what),
             Self::TooManyUnused { what, allowed } => {
-                write!(f, "{what}; `source.max_without_pose` expects a larger share than {allowed}")
+                write!(f, "{what}; `source.max_without_pose` allows a share of {allowed}")
             }
             Self::OutsideImage { outside, boxes, image: [width, height] } => write!(
                 f,
@@ -188,10 +188,11 @@ impl fmt::Display for Warning {
                 if objects.len() == 1 { "an object" } else { "objects" },
                 objects.join(", ")
             ),
-            Self::PosesMisfit { misfits, fitted } => write!(
+            Self::PosesMisfit { unexplained, boxes } => write!(
                 f,
-                "{misfits} of {fitted} ellipsoids do not fit their boxes: check that the poses are those of the camera (world \
-                 from camera, z forward, quaternion in the order of the format), and check the intrinsics"
+                "no ellipsoid fits {unexplained} of {boxes} boxes: check that the poses are those of the camera (world \
+                 from camera, z forward, quaternion in the order of the format), and compare cx, cy and the size of the image \
+                 with the images of the detector"
             ),
             Self::Flat { objects } => write!(
                 f,
@@ -205,8 +206,8 @@ impl fmt::Display for Warning {
                  {{ type = \"geman_mcclure\", scale = 5.0 }}"
             ),
             Self::NotRobust => f.write_str(
-                "boxes without names are put to wrong objects now and then, and count in full; \
-                 `detections.loss = { type = \"cauchy\", scale = 1.0 }` takes weight from them",
+                "data association assigns some boxes to wrong objects, and without a loss they have full weight: \
+                 set `detections.loss = { type = \"cauchy\", scale = 1.0 }`",
             ),
             Self::Inactive { inactive, factors } => write!(
                 f,

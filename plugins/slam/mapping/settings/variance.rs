@@ -44,7 +44,7 @@ impl Default for VarianceSettings {
             correlation: true,
             odometry: true,
             pivot: true,
-            prefix_s: Positive::literal(10.0),
+            prefix_s: Positive::literal(5.0),
         }
     }
 }

@@ -5,7 +5,7 @@ class MapView {
     this.canvas = this.find("canvas");
     this.renderer = new Renderer(this.canvas);
     this.take(run);
-    this.state = { frame: 0, selected: null, show: {}, hidden: new Set(), active: this.first() };
+    this.state = { frame: 0, selected: null, show: {}, hidden: new Set(), hiddenObjects: new Set(), active: this.first() };
     this.orbit = new Orbit(this.canvas, run.variants[0].up, this.extent, () => this.redraw(), (x, y) => this.tap(x, y), e => this.pressed(e));
     for (const box of document.querySelectorAll("[data-show]")) {
       const set = () => { this.state.show[box.dataset.show] = box.checked; };
@@ -21,6 +21,7 @@ class MapView {
       if (picked) this.orbit.fit({ middle: picked.estimate.slice(0, 3), radius: 4 * Math.max(...picked.estimate.slice(7)) });
     });
     this.find("reset").addEventListener("click", () => this.orbit.reset());
+    this.find("unhide").addEventListener("click", () => this.showHiddenObjects());
     this.controls();
     document.documentElement.classList.add("webgl");
     new ResizeObserver(() => this.redraw()).observe(this.canvas);
@@ -56,15 +57,29 @@ class MapView {
     return this.state.active.map(i => this.run.variants[i]);
   }
 
-  // Returns the objects of a variant whose class is shown.
+  // Returns the objects of a variant that are shown.
   objects(variant) {
-    return variant.objects.filter(o => !this.state.hidden.has(o.class));
+    const { hidden, hiddenObjects } = this.state;
+    return variant.objects.filter(o => !hidden.has(o.class) && !hiddenObjects.has(o.id));
   }
 
   showClass(name, isShown) {
     isShown ? this.state.hidden.delete(name) : this.state.hidden.add(name);
     const { selected } = this.state;
     if (selected !== null && !this.variants.some(v => this.objects(v).some(o => o.id === selected))) this.state.selected = null;
+    this.redraw();
+  }
+
+  hideSelected() {
+    if (this.state.selected === null) return;
+    this.state.hiddenObjects.add(this.state.selected);
+    this.find("unhide").hidden = false;
+    this.select(null);
+  }
+
+  showHiddenObjects() {
+    this.state.hiddenObjects.clear();
+    this.find("unhide").hidden = true;
     this.redraw();
   }
 
@@ -78,6 +93,7 @@ class MapView {
     const next = step => ids.length && this.select(ids[(ids.indexOf(this.state.selected) + step + ids.length + (step < 0 && this.state.selected === null ? 1 : 0)) % ids.length]);
     if (key === "n") next(1);
     else if (key === "p") next(-1);
+    else if (key === "h") this.hideSelected();
     else if (key === "Escape") this.state.selected === null ? this.canvas.blur() : this.select(null);
     else return false;
     return true;
@@ -138,7 +154,7 @@ class MapView {
     });
     // a screen reader reads it after a change, and not if only the camera turns
     const { selected, frame, active } = this.state, told = [selected, frame, active].join();
-    if (this.told !== told) describe(this.find("object"), this.variants, selected, frame);
+    if (this.told !== told) describe(this.find("object"), this.variants, selected, frame, () => this.hideSelected());
     this.told = told;
     Object.assign(this.canvas.dataset, { selected: this.state.selected ?? "", frame: this.state.frame, drawn: +(this.canvas.dataset.drawn ?? 0) + 1 });
   }

@@ -13,7 +13,7 @@ function pageStyle() {
 }
 
 // One image of a variant: measured boxes dashed, estimated outlines filled, the boxes around these thin.
-function drawImage(canvas, variant, { frame, selected, hidden }, style) {
+function drawImage(canvas, variant, { frame, selected, hidden, hiddenObjects }, style) {
   const [, , , , width, height] = variant.camera, shown = Math.max(canvas.clientWidth, 200);
   const ratio = Math.min(window.devicePixelRatio || 1, 2);
   canvas.width = Math.round(shown * ratio);
@@ -25,7 +25,7 @@ function drawImage(canvas, variant, { frame, selected, hidden }, style) {
   const taken = [];
   for (const [id, [xmin, ymin, xmax, ymax], ellipse, label] of variant.frames[frame][6]) {
     const object = byId.get(id), color = object?.color ?? style.text, bold = id === selected ? 2 : 1;
-    if (hidden.has(object?.class)) continue;
+    if (hidden.has(object?.class) || hiddenObjects.has(id)) continue;
     Object.assign(draw, { strokeStyle: color, fillStyle: color });
     if (ellipse) {
       const [u, v, uu, uv, vv] = ellipse, turn = 0.5 * Math.atan2(2 * uv, uu - vv);
@@ -54,8 +54,8 @@ function drawImage(canvas, variant, { frame, selected, hidden }, style) {
   }
 }
 
-// The details of an object, with a column for each shown variant.
-function describe(panel, variants, id, frame) {
+// The details of an object, with a column for each shown variant, and a button that hides it.
+function describe(panel, variants, id, frame, hide) {
   panel.replaceChildren();
   const found = variants.map(v => v.objects.find(o => o.id === id)), any = found.find(Boolean);
   if (!any) {
@@ -65,7 +65,9 @@ function describe(panel, variants, id, frame) {
   const heading = element("h3", "");
   const swatch = element("span", "", { class: "swatch" });
   swatch.style.background = any.color;
-  heading.append(swatch, `${any.class} (${any.key})`);
+  const button = element("button", "hide", { "aria-label": `hide ${any.class} ${any.key}` });
+  button.addEventListener("click", hide);
+  heading.append(swatch, `${any.class} (${any.key}) `, button);
   const table = element("table"), body = element("tbody");
   const row = (name, of) => {
     const cells = found.map(o => (o && of(o)) ?? "-");
