@@ -96,11 +96,11 @@ fn frames_that_come_as_lines_are_mapped_without_names() {
     ran.complains("standard input, line 3: EOF while parsing");
     ran.complains("does not come after the one before");
     assert!(ran.stdout.contains("data association by likelihood"), "{}", ran.stdout);
-    assert!(!ran.stdout.contains("count in full"), "{}", ran.stdout);
+    assert!(!ran.stdout.contains("full weight"), "{}", ran.stdout);
     let plain = LIVE.replace("detections = { loss = { type = \"cauchy\", scale = 2.8 } }", "");
     std::fs::write(path(&folder, "plain.toml"), plain).unwrap();
     let ran = fed(&format!("online {} --out {out}_plain", path(&folder, "plain.toml")), &lines).ended(0);
-    assert!(ran.stdout.contains("count in full"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("full weight"), "{}", ran.stdout);
     let metrics = std::fs::read_to_string(format!("{out}/estimate/metrics.json")).unwrap();
     let metrics: Value = serde_json::from_str(&metrics).unwrap();
     assert_eq!((&metrics["counts"]["frames"], &metrics["online"]["refusals"]), (&60.into(), &2.into()));

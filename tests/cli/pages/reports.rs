@@ -161,6 +161,15 @@ fn the_map_turns_zooms_and_tells_of_an_object() {
     assert!(before > 0.0 && number(&mut browser, names) == 0.0);
     browser.value("tick.click(); mapView.select(picked.id); 0");
     browser.until("canvas.dataset.selected === String(picked.id)");
+    // a single object is hidden and shown again
+    let shown = "mapView.objects(mapView.variants[0]).length";
+    let all = number(&mut browser, shown);
+    browser.value("document.querySelector('#object button').click(); 0");
+    browser.until("canvas.dataset.selected === '' && !document.getElementById('unhide').hidden");
+    assert_eq!(number(&mut browser, shown), all - 1.0);
+    browser.value("document.getElementById('unhide').click(); mapView.select(picked.id); 0");
+    browser.until("canvas.dataset.selected === String(picked.id)");
+    assert_eq!(number(&mut browser, shown), all);
     // an overlay has one view for all variants
     browser.value("document.querySelector('[data-show=overlay]').click(); 0");
     browser.until(
@@ -195,6 +204,14 @@ fn a_printed_report_fits_its_paper() {
     let paper = browser.value("getComputedStyle(document.documentElement).getPropertyValue('--paper')");
     assert_eq!(paper, "#ffffff");
     browser.save_screenshot("printed");
+    // folded sections are open while the page is printed
+    let folded = "document.querySelectorAll('details:not([open])').length";
+    let before = browser.value(folded);
+    assert_ne!(before, 0);
+    browser.value("dispatchEvent(new Event('beforeprint')); 0");
+    assert_eq!(browser.value(folded), 0);
+    browser.value("dispatchEvent(new Event('afterprint')); 0");
+    assert_eq!(browser.value(folded), before);
 }
 
 #[test]

@@ -277,7 +277,12 @@ fn misfit_warning(mapping: &Mapping) -> Option<Warning> {
     };
     let (unexplained, mapped) = (boxes(&is_unexplained), boxes(&|object| object.rejected.is_none()));
     let boxes = unexplained + mapped;
-    let limit = if boxes < FEW_BOXES { MAX_UNEXPLAINED_OF_FEW } else { MAX_UNEXPLAINED };
+    let limit = match boxes {
+        // there is a warning that no object is mapped
+        ..FEW_BOXES if mapped == 0 => return None,
+        ..FEW_BOXES => MAX_UNEXPLAINED_OF_FEW,
+        _ => MAX_UNEXPLAINED,
+    };
     (unexplained as f64 > limit * boxes as f64).then_some(Warning::PosesMisfit { unexplained, boxes })
 }
 

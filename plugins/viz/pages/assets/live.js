@@ -85,7 +85,7 @@ class LivePage {
         this.find("images").replaceChildren(element("canvas"));
       }
     }
-    if (frames.length) drawImage(this.find("images").firstChild, run.variants[0], { frame: frames.length - 1, selected: null, hidden: new Set() }, pageStyle());
+    if (frames.length) drawImage(this.find("images").firstChild, run.variants[0], { frame: frames.length - 1, selected: null }, pageStyle());
   }
 
   listObjects(objects) {

@@ -57,10 +57,13 @@ class MapView {
     return this.state.active.map(i => this.run.variants[i]);
   }
 
+  isShown({ id, class: name }) {
+    return !this.state.hidden.has(name) && !this.state.hiddenObjects.has(id);
+  }
+
   // Returns the objects of a variant that are shown.
   objects(variant) {
-    const { hidden, hiddenObjects } = this.state;
-    return variant.objects.filter(o => !hidden.has(o.class) && !hiddenObjects.has(o.id));
+    return variant.objects.filter(o => this.isShown(o));
   }
 
   showClass(name, isShown) {
@@ -150,7 +153,7 @@ class MapView {
     this.key(style);
     [...this.find("images").children].forEach((canvas, i) => {
       const variant = this.variants[i];
-      if (variant.frames[this.state.frame]) drawImage(canvas, variant, this.state, style);
+      if (variant.frames[this.state.frame]) drawImage(canvas, variant, this.state, style, o => this.isShown(o));
     });
     // a screen reader reads it after a change, and not if only the camera turns
     const { selected, frame, active } = this.state, told = [selected, frame, active].join();

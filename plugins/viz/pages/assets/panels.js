@@ -13,7 +13,7 @@ function pageStyle() {
 }
 
 // One image of a variant: measured boxes dashed, estimated outlines filled, the boxes around these thin.
-function drawImage(canvas, variant, { frame, selected, hidden, hiddenObjects }, style) {
+function drawImage(canvas, variant, { frame, selected }, style, isShown = () => true) {
   const [, , , , width, height] = variant.camera, shown = Math.max(canvas.clientWidth, 200);
   const ratio = Math.min(window.devicePixelRatio || 1, 2);
   canvas.width = Math.round(shown * ratio);
@@ -25,7 +25,7 @@ function drawImage(canvas, variant, { frame, selected, hidden, hiddenObjects }, 
   const taken = [];
   for (const [id, [xmin, ymin, xmax, ymax], ellipse, label] of variant.frames[frame][6]) {
     const object = byId.get(id), color = object?.color ?? style.text, bold = id === selected ? 2 : 1;
-    if (hidden.has(object?.class) || hiddenObjects.has(id)) continue;
+    if (object && !isShown(object)) continue;
     Object.assign(draw, { strokeStyle: color, fillStyle: color });
     if (ellipse) {
       const [u, v, uu, uv, vv] = ellipse, turn = 0.5 * Math.atan2(2 * uv, uu - vv);
