@@ -1,5 +1,5 @@
 //! Variance components on data with known noise.
-use crate::online::{both, run_of};
+use crate::online::{CollectedReports, both, run_of};
 use manifactor_config::{Document, Format};
 use manifactor_graph::Manifold;
 use manifactor_graph::loss::Loss;
@@ -115,7 +115,7 @@ fn the_noise_of_boxes_is_not_that_of_their_depths() {
 
 /// A camera that moves around a desk, with an odometry that boxes improve.
 const STREAM: &str = r#"
-source = { type = "simulated", seed = 3, scene = { objects = 10 }, trajectory = { frames = 90 },
+source = { type = "simulated", seed = 3, scene = { objects = 8 }, trajectory = { frames = 60 },
            odometry = { translation = 0.3, rotation = 0.3 } }
 association = { type = "likelihood" }
 detections = { loss = { type = "cauchy", scale = 2.8 } }
@@ -126,13 +126,14 @@ variance_components = { prefix_s = 1.0 }
 fn a_stream_trusts_its_odometry_until_its_noise_is_estimated() {
     let document = run_of(STREAM, &[]);
     let variant = &document.variants[0];
-    let (online, _, kept) = both(&document, variant, None);
+    let (online, batch, kept) = both(&document, variant, None);
     let noisy: Vec<_> = kept.reports().iter().filter(|report| report.noise.is_some()).collect();
     let [report] = noisy[..] else { panic!("{} estimates", noisy.len()) };
     let sequence = variant.settings.source.load(&InputFolders::default()).unwrap();
     let first = sequence.frames[0].timestamp;
-    assert!((2.0..2.1).contains(&(report.timestamp - first)), "{}", report.timestamp);
-    assert_eq!(online.online.unwrap().noise, report.noise);
+    // a first attempt may come before there are four objects
+    assert!(report.timestamp - first >= 2.0, "{}", report.timestamp);
+    assert_eq!(online.online.as_ref().unwrap().noise, report.noise);
     // before it, motions are those of the odometry
     for frame in 1..report.frame {
         let [from, to] = [frame - 1, frame].map(|i| sequence.frames[i].world_from_camera);
@@ -150,26 +151,22 @@ fn a_stream_trusts_its_odometry_until_its_noise_is_estimated() {
     let (graph, _) = last.smoother().graph();
     let of =
         |name: &str| graph.factors().iter().filter(|f| f.factor.typetag_name() == name).collect::<Vec<_>>();
-    let (motions, boxes) = (of("between"), of("bounding_box"));
+    let (motions, boxes) = (of("between_se3"), of("bounding_box"));
     assert!(motions.len() == report.frame && boxes.len() > 100, "{} {}", motions.len(), boxes.len());
     assert!(motions.iter().all(|motion| motion.noise == settings.odometry.noise));
     assert!(boxes.iter().all(|seen| seen.noise == settings.detections.noise));
     assert_eq!(last.pose_of(report.frame), Some(report.pose));
-}
-
-#[test]
-fn a_batch_assigns_boxes_with_the_noise_of_a_stream() {
-    let document = run_of(STREAM, &[]);
-    let (online, batch, kept) = both(&document, &document.variants[0], None);
-    assert!(kept.reports().iter().any(|report| report.noise.is_some()));
-    let [online, batch] = [online, batch].map(|report| report.association.unwrap().at_the_time);
+    // a batch assigns boxes with the same noise
+    let [online, batch] = [online.association, batch.association].map(|of| of.unwrap().at_the_time);
     assert_eq!(format!("{online:?}"), format!("{batch:?}"));
 }
 
 #[test]
 fn a_stream_without_objects_keeps_the_initial_noise() {
     let document = run_of(STREAM, &["source.scene.objects=2"]);
-    let (online, _, kept) = both(&document, &document.variants[0], None);
+    let mut kept = CollectedReports::default();
+    let (_, online) =
+        Run::new(&document, None).run_variant_online(&document.variants[0], &mut kept, &mut Silent).unwrap();
     assert!(kept.reports().iter().all(|report| report.noise.is_none()));
     assert_eq!(online.online.unwrap().refusals, 0);
 }

@@ -87,7 +87,10 @@ impl NoiseEstimation {
             Stage::Running { objects, thread, .. } => match thread.join() {
                 Ok(Some(noise)) => {
                     match mapper.set_noise(&noise) {
-                        Ok(update) => report.updates.push(update),
+                        Ok(update) => {
+                            report.updates.push(update);
+                            report.pose = mapper.pose_of(report.frame).unwrap_or(report.pose);
+                        }
                         Err(error) => {
                             report.refused.push(format!("the noise of earlier frames stays: {error}"))
                         }
