@@ -80,7 +80,7 @@ impl StreamNoise {
         observer: &mut dyn Observer,
     ) -> Result<Option<Self>, EstimateError> {
         let Some(variance) = &settings.variance_components else { return Ok(None) };
-        let mut settings = settings.clone();
+        let mut settings = settings.clone().for_stream();
         settings.completion.enabled = false;
         settings.objects.refinements = 0;
         // one noise for all boxes: there are too few for several
