@@ -92,7 +92,7 @@ impl NoiseEstimation {
                             report.pose = mapper.pose_of(report.frame).unwrap_or(report.pose);
                         }
                         Err(error) => {
-                            report.refused.push(format!("the noise of earlier frames stays: {error}"))
+                            report.refused.push(format!("the noise of earlier frames stays: {error}"));
                         }
                     }
                     report.noise = Some(noise);
