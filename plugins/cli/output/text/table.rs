@@ -1,8 +1,8 @@
 //! Tables for any width from 60 columns on; no number and no name is ever broken.
 //!
-//! A table of numbers leaves out columns without any number. One that is too wide keeps the columns of highest priority that fit, and lists the hidden
-//! ones. A table of words wraps its last column. If that is not enough, rows are turned: a name, and below
-//! it one line for each cell.
+//! A table of numbers leaves out columns without any number. One that is too wide keeps the columns of
+//! highest priority that fit, and lists the hidden ones. A table of words wraps its last column. If that is
+//! not enough, rows are turned: a name, and below it one line for each cell.
 use super::{on_one_line, width, wrapped};
 use unicode_width::UnicodeWidthStr;
 

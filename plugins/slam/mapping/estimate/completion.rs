@@ -23,7 +23,7 @@ use serde::Serialize;
 const MIN_BOX_OVERLAP: f64 = 0.1;
 
 /// Share of boxes without an ellipsoid that explains them, above which the poses or the camera are probably
-/// wrong. On recordings with correct poses it is below 0.02. In a simulated recording with quaternions in the
+/// wrong. On TUM RGB-D it is below 0.02. In a simulated recording with quaternions in the
 /// wrong order, poses of the body, inverted poses or wrong intrinsics, it is 0.23 to 0.57.
 const MAX_UNEXPLAINED: f64 = 0.2;
 /// The limit for less than `FEW_BOXES` boxes, where a single object may have a fifth of them.
@@ -287,13 +287,10 @@ fn misfit_warning(mapping: &Mapping) -> Option<Warning> {
 }
 
 fn is_unexplained(object: &MappedObject) -> bool {
-    let fits_badly = |rejection: &Rejection| {
-        matches!(
-            rejection,
-            Rejection::Misfit { .. } | Rejection::Stalled { .. } | Rejection::Initialisation { .. }
-        )
-    };
-    object.rejected.as_ref().is_some_and(fits_badly)
+    matches!(
+        object.rejected,
+        Some(Rejection::Misfit { .. } | Rejection::Stalled { .. } | Rejection::Initialisation { .. })
+    )
 }
 
 /// Returns the intersection over union of a box with the visible part of an ellipsoid's outline.

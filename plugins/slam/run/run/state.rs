@@ -29,7 +29,8 @@ impl StreamState {
         self.sequence.push(observation.clone());
         if let Some(noise) = &mut self.noise {
             let first = self.sequence.frames.first().map_or(report.timestamp, |first| first.timestamp);
-            let named = |mapper: &Mapper| named_sequence(&self.sequence, &self.association, mapper);
+            let named =
+                |mapper: &Mapper| with_current_objects(self.sequence.clone(), &self.association, mapper);
             noise.after_frame(report.timestamp - first, &mut self.mapper, &mut report, named);
         }
         Ok(report)
@@ -58,14 +59,19 @@ impl StreamState {
         again
     }
 
-    /// Returns the accepted frames with the current objects of their boxes.
-    pub(super) fn named_sequence(&self) -> Sequence {
-        named_sequence(&self.sequence, &self.association, &self.mapper)
+    /// Returns the map, and the accepted frames with the current objects of their boxes.
+    pub(super) fn into_parts(self) -> (Mapper, Sequence, AssociationHistory) {
+        let Self { mapper, sequence, association, .. } = self;
+        let sequence = with_current_objects(sequence, &association, &mapper);
+        (mapper, sequence, association)
     }
 }
 
-fn named_sequence(accepted: &Sequence, association: &AssociationHistory, mapper: &Mapper) -> Sequence {
-    let mut sequence = accepted.clone();
+fn with_current_objects(
+    mut sequence: Sequence,
+    association: &AssociationHistory,
+    mapper: &Mapper,
+) -> Sequence {
     let objects = association.current_objects(mapper.id_changes());
     for (detection, object) in sequence.detections.iter_mut().zip(objects) {
         detection.object = object;

@@ -77,8 +77,7 @@ pub fn online(
     progress.add_frame_report(&taken.mapper.finish_association());
     progress.add_final_counts(&mut taken.mapper);
     watch.on_end(&mut taken.mapper);
-    let sequence = taken.named_sequence();
-    let StreamState { mapper, association: history, .. } = taken;
+    let (mapper, sequence, history) = taken.into_parts();
     let association = history.report(&*settings.association, mapper.id_changes());
     let estimate = mapper.finish(Arc::new(sequence), observer)?;
     progress.compare_live_poses(&estimate, &settings.evaluation);

@@ -10,7 +10,7 @@ use manifactor_geometry::Se3;
 use manifactor_graph::checked::{OutOfDomain, Positive};
 use manifactor_graph::loss::Loss;
 use manifactor_graph::noise::NoiseError;
-use manifactor_graph::{FactorEntry, Key};
+use manifactor_graph::{FactorEntry, Key, Noise};
 use manifactor_solve::{CompileError, CovarianceError, Observer};
 use serde::Serialize;
 use std::any::TypeId;
@@ -142,10 +142,7 @@ impl VarianceComponents {
                 },
                 _ => continue,
             };
-            entry.noise = match entry.noise.observed() {
-                Some(observed) => noise.observing(observed),
-                None => noise,
-            };
+            replace_noise(entry, noise);
         }
         Ok(())
     }
@@ -157,6 +154,14 @@ impl VarianceComponents {
         });
         boxes.map(|(now, before)| (now / before).ln().abs()).fold(0.0, f64::max)
     }
+}
+
+/// Replaces the noise of a factor, which keeps its observed rows.
+pub(super) fn replace_noise(entry: &mut FactorEntry, noise: Noise) {
+    entry.noise = match entry.noise.observed() {
+        Some(observed) => noise.observing(observed),
+        None => noise,
+    };
 }
 
 /// Returns the kind of measurement of a factor. Odometry is a factor between the poses of consecutive frames.
@@ -179,7 +184,6 @@ fn are_consecutive(from: &Key, to: &Key) -> bool {
 mod tests {
     use super::*;
     use manifactor_geometry::Between;
-    use manifactor_graph::Noise;
 
     fn is_odometry(keys: [&str; 2]) -> bool {
         let entry = FactorEntry {

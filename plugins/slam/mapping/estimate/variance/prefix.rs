@@ -1,5 +1,5 @@
 //! The noise of a stream, estimated from its first seconds.
-use super::components::{MeasurementOf, measurement_of};
+use super::components::{MeasurementOf, measurement_of, replace_noise};
 use super::{BoxComponent, BoxGroups, MotionComponent, VarianceComponents, VarianceError, VarianceSettings};
 use crate::estimate::{Estimate, EstimateError};
 use crate::mapping::Mapping;
@@ -57,7 +57,8 @@ impl StreamNoise {
         let of_box = boxes.map(|boxes| -> Result<_, VarianceError> {
             Ok((boxes.noise(None)?, Positive::new(boxes.correlation_time)?))
         });
-        Ok(Self { odometry, keeps_odometry: false, boxes, of_motion, of_box: of_box.transpose()? })
+        let keeps_odometry = odometry == Some(MotionComponent::UNCHANGED);
+        Ok(Self { odometry, keeps_odometry, boxes, of_motion, of_box: of_box.transpose()? })
     }
 
     /// Returns the noise before any data. It does not depend on the run document. The odometry keeps its
@@ -65,8 +66,7 @@ impl StreamNoise {
     pub fn initial(settings: &VarianceSettings) -> Self {
         let boxes = (settings.boxes != BoxGroups::Given).then(VarianceComponents::initial_box_noise);
         let odometry = settings.odometry.then_some(MotionComponent::UNCHANGED);
-        let noise = Self::new(odometry, boxes).unwrap_or_default();
-        Self { keeps_odometry: settings.odometry, ..noise }
+        Self::new(odometry, boxes).unwrap_or_default()
     }
 
     /// Estimates the noise from the first frames of a stream. `None` if nothing is mapped yet, or too few
@@ -96,8 +96,7 @@ impl StreamNoise {
             return Ok(None);
         }
         let odometry = found.odometry.map(|choice| choice.noise);
-        let noise = Self::new(odometry, found.boxes.values().next().copied())?;
-        Ok(Some(Self { keeps_odometry: estimate.keeps_odometry(), ..noise }))
+        Ok(Some(Self::new(odometry, found.boxes.values().next().copied())?))
     }
 
     /// Returns a factor of a motion or a box with this noise, which `settings` have already; `None` for other
@@ -113,10 +112,7 @@ impl StreamNoise {
             }
             MeasurementOf::Other => return None,
         };
-        entry.noise = match entry.noise.observed() {
-            Some(observed) => noise.observing(observed),
-            None => noise,
-        };
+        replace_noise(&mut entry, noise);
         Some(entry)
     }
 
