@@ -7,6 +7,7 @@ use crate::error::{FormatError, Mistake, ProblemList};
 use crate::lines::{Fields, lines};
 use crate::text::{read_text, write_text};
 use manifactor_geometry::{Se3, So3};
+use manifactor_graph::Manifold;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -17,6 +18,14 @@ pub struct StampedPose {
     pub timestamp: f64,
     /// The pose `world_from_camera`.
     pub pose: Se3,
+}
+
+impl StampedPose {
+    /// Returns the pose at a time between this one and `to`, on the geodesic of SE(3) with constant twist.
+    pub fn interpolate(&self, to: &Self, timestamp: f64) -> Se3 {
+        let share = (timestamp - self.timestamp) / (to.timestamp - self.timestamp);
+        self.pose.retract(&(self.pose.local(&to.pose) * share))
+    }
 }
 
 /// Maximum lateness of a line relative to the previous one, in seconds.

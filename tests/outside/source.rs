@@ -21,7 +21,7 @@ struct Nothing {
 #[typetag::serialize(name = "test_nothing")]
 impl SequenceSource for Nothing {
     fn load(&self, _folders: &InputFolders) -> Result<Sequence, SourceError> {
-        let frame = |i: usize| Frame { timestamp: i as f64, world_from_camera: Se3::identity() };
+        let frame = |i: usize| Frame::new(i as f64, Se3::identity());
         Ok(Sequence {
             camera: Camera { fx: 320.0, fy: 320.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 },
             frames: (0..self.frames).map(frame).collect(),
@@ -29,6 +29,7 @@ impl SequenceSource for Nothing {
             up: Some(Direction::Z),
             accelerometer: vec![],
             ground_truth: None,
+            pose_factors: vec![],
             unused: vec![],
         })
     }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 
 /// A window that moves with the newest variables. Older variables are marginalized at the end of an update,
-/// as by [`Smoother::marginalize`](crate::Smoother::marginalize).
+/// as by [`Smoother::marginalize`](crate::Smoother::marginalize), in groups: a window is longer by up to an eighth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "WindowDocument", into = "WindowDocument")]
 #[schemars(with = "WindowDocument")]
@@ -33,11 +33,13 @@ pub enum Span {
 #[schemars(rename = "Window")]
 struct WindowDocument {
     /// Number of variables that stay, at least one: the newest ones, without the types of `keep`. Older ones
-    /// are marginalized at the end of an update, as by `Smoother::marginalize`. Either this or `seconds`.
+    /// are marginalized at the end of an update, as by `Smoother::marginalize`, once they are more than an eighth
+    /// of this number. Either this or `seconds`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     poses: Option<NonZeroUsize>,
     /// Time for which a variable stays after it was pushed, by the clock of `Smoother::set_time`. The newest
-    /// variable always stays. Either this or `poses`. Unit: seconds.
+    /// variable always stays. Older ones are marginalized once the oldest exceeds the time by an eighth. Either this
+    /// or `poses`. Unit: seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     seconds: Option<Positive>,
     /// Names of types whose variables always stay, for example `"dual_quadric"`. Default: none.

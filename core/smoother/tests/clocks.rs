@@ -27,7 +27,7 @@ fn pose(smoother: &mut Smoother, i: usize, time: f64) -> Vec<String> {
 #[test]
 fn a_pose_each_second_is_as_in_a_window_by_poses() {
     let (mut by_seconds, mut by_poses) =
-        (smoother(seconds(4.5)), smoother(Span::Poses(NonZeroUsize::new(5).unwrap())));
+        (smoother(seconds(4.4)), smoother(Span::Poses(NonZeroUsize::new(5).unwrap())));
     for i in 0..40 {
         let leaving = pose(&mut by_seconds, i, 1e9 + i as f64);
         assert_eq!(leaving, pose(&mut by_poses, i, i as f64));

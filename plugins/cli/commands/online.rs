@@ -8,7 +8,7 @@ use crate::output::watch::Watch as Progress;
 use crate::status::Status;
 use crate::view::{SolveDisplay, View, address};
 use clap::Args;
-use manifactor::slam::online::{FrameError, FrameReport, Mapper};
+use manifactor::slam::online::{FrameError, FrameReport, Mapper, ObjectUpdates};
 use manifactor::slam::run::{RunError, StreamWatcher};
 use manifactor::slam::sequence::Observation;
 use manifactor::solve::{AllObservers, Interrupt};
@@ -42,6 +42,10 @@ pub(crate) struct Online {
     /// as one line of JSON each.
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
+    /// Add the objects that have changed since the last line to each line of --json: state, class, ellipsoid and
+    /// covariance. With --every 1, a program can follow the map frame by frame.
+    #[arg(long, requires = "json")]
+    map: bool,
     /// Serve a live page of the map, and print its address on stderr. Default: a free port, for browsers on
     /// this machine only; --view=8080 sets the port. --view=0.0.0.0:8080 admits other machines, which need
     /// the token in the address.
@@ -71,8 +75,14 @@ impl Online {
             let interrupted = interrupt.clone();
             let mut solve = SolveDisplay(view.as_ref());
             let mut observers = AllObservers(vec![&mut progress, &mut interrupt, &mut solve]);
-            let mut frames =
-                Frames { command: self, interrupt: interrupted, view: view.as_ref(), frames: 0, begun: None };
+            let mut frames = Frames {
+                command: self,
+                interrupt: interrupted,
+                view: view.as_ref(),
+                frames: 0,
+                begun: None,
+                objects: ObjectUpdates::default(),
+            };
             let done = run.run_variant_online(variant, &mut frames, &mut observers)?;
             if let Some(view) = &view {
                 view.show_estimate(&done.0);
@@ -117,6 +127,8 @@ struct Frames<'a> {
     frames: u64,
     /// Arrival time of the first frame, and its timestamp.
     begun: Option<(Instant, f64)>,
+    /// Objects as printed last.
+    objects: ObjectUpdates,
 }
 
 /// Interval at which a waiting command checks for an interrupt.
@@ -131,11 +143,15 @@ impl Frames<'_> {
         if self.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    fn print_frame(&self, report: &FrameReport, mapper: &Mapper, took: f64) {
+    fn print_frame(&mut self, report: &FrameReport, mapper: &Mapper, took: f64) {
         let (objects, undetermined) =
             (mapper.mapped_objects(), report.updates.last().map_or(0, |u| u.undetermined_directions.len()));
         if self.command.options.json {
-            output::print_json_line(&json!({ "seconds": took, "objects": objects, "report": report }));
+            let mut line = json!({ "seconds": took, "objects": objects, "report": report });
+            if self.command.map {
+                line["map"] = json!(self.objects.take(mapper));
+            }
+            output::print_json_line(&line);
         } else {
             let open = if undetermined > 0 {
                 format!(", {undetermined} directions undetermined")

@@ -107,7 +107,7 @@ pub(crate) mod tests {
 
     /// Two frames at 10 s and 11 s; the camera looks along the odometry's z axis.
     pub(crate) fn sequence() -> Sequence {
-        let frame = |timestamp: f64| Frame { timestamp, world_from_camera: Se3::identity() };
+        let frame = |timestamp: f64| Frame::new(timestamp, Se3::identity());
         Sequence {
             camera: Camera::new([500.0, 500.0, 320.0, 240.0], 640, 480).unwrap(),
             frames: vec![frame(10.0), frame(11.0)],
@@ -115,6 +115,7 @@ pub(crate) mod tests {
             up: None,
             accelerometer: vec![],
             ground_truth: None,
+            pose_factors: vec![],
             unused: vec![],
         }
     }

@@ -2,7 +2,8 @@
 //!
 //! Variables are the camera poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics.
 //! Factors, in this order: the prior on the first pose; odometry between consecutive poses; for each object
-//! its boxes, then its semantic factors; last, variables and factors of the run document.
+//! its boxes, then its semantic factors; variables and factors of the run document; last, factors on poses that
+//! arrived with frames.
 use crate::gravity::{GravityError, MapFrame};
 use crate::mapping::measurements::{Measurements, ObjectBox, ObjectMeasurements};
 use crate::motion::{MotionError, MotionStep, RelativePose};
@@ -11,12 +12,12 @@ use crate::settings::{DetectionSettings, OdometrySettings, RunSettings};
 use manifactor_formats::plausible;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::{Prior, Se3};
-use manifactor_graph::{FactorEntry, Graph, Key, Values, Variable};
+use manifactor_graph::{FactorEntry, Graph, GraphError, Key, Values, Variable};
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
 use manifactor_recording::fusion::FusedClass;
 use manifactor_recording::measurement::MeasurementSigmas;
 use manifactor_recording::prior_map::PriorObject;
-use manifactor_recording::sequence::{Frame, ObjectId, Sequence, UnusedDetection};
+use manifactor_recording::sequence::{Frame, ObjectId, Sequence, UnusedInput};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -136,7 +137,8 @@ impl Mapping {
             mapping.objects.push(object);
         }
         settings.own.add_to(&mut mapping.graph, &mut mapping.values);
-        mapping.add_warnings(sequence, settings);
+        let unused = mapping.add_pose_factors(sequence);
+        mapping.add_warnings(sequence, &unused, settings);
         let (poses, objects, factors) =
             (sequence.frames.len(), mapping.mapped().count(), mapping.graph.factors().len());
         tracing::info!(poses, objects, factors, "mapped");
@@ -158,7 +160,7 @@ impl Mapping {
         for (i, pair) in sequence.frames.windows(2).enumerate() {
             let [from, to] = pair else { continue };
             let estimates = |key: &str| self.values.variable(key).map(|value| value.erased().clone_box());
-            let step = motion_step([i, i + 1], [from, to], &settings.odometry, &estimates);
+            let step = motion_step([i, i + 1], [from, to], settings, &estimates);
             let factors = settings.motion.factors(&step)?;
             if let (Ok(a), Ok(b)) = (self.values.get(pose_key(i)), self.values.get(pose_key(i + 1))) {
                 let variables = settings.motion.variables(&step, [a, b]);
@@ -204,13 +206,42 @@ impl Mapping {
         }
     }
 
-    fn add_warnings(&mut self, sequence: &Sequence, settings: &RunSettings) {
+    /// Adds the factors on poses that arrived with frames. Returns those that do not fit.
+    fn add_pose_factors(&mut self, sequence: &Sequence) -> Vec<UnusedInput> {
+        let mut unused = vec![];
+        for (arrived, factor) in &sequence.pose_factors {
+            let find = |key: &str| {
+                let (place, value) = self.values.find(key)?;
+                Some((place, value.erased().type_id()))
+            };
+            let entry = factor.entry(&sequence.frames).map_err(|error| error.to_string());
+            let fits = entry.and_then(|entry| {
+                let mut errors = vec![];
+                let resolved = entry.resolve(0, find, &mut errors);
+                resolved
+                    .map(|_| entry)
+                    .ok_or_else(|| errors.first().map_or(String::new(), GraphError::to_string))
+            });
+            match fits {
+                Ok(entry) => _ = self.graph.push(entry),
+                Err(fault) => {
+                    let timestamp = sequence.frames.get(*arrived).map_or(f64::NAN, |frame| frame.timestamp);
+                    let field = format!("`{}`", factor.label());
+                    unused.push(UnusedInput::PoseGraph { timestamp, field, fault });
+                }
+            }
+        }
+        unused
+    }
+
+    fn add_warnings(&mut self, sequence: &Sequence, unused: &[UnusedInput], settings: &RunSettings) {
         let odometry = sequence.frames.iter().map(|frame| (frame.timestamp, frame.world_from_camera));
         let doubts =
             plausible::trajectory_doubts(odometry).into_iter().map(|what| Warning::Implausible { what });
         self.warnings.extend(doubts);
         self.warnings.extend(image_warning(sequence));
-        self.warnings.extend(unused_warnings(sequence, self.measurements.without_area));
+        let unused = sequence.unused.iter().chain(unused);
+        self.warnings.extend(unused_warnings(unused, self.measurements.without_area));
         let detected = self.objects.iter().filter(|object| object.detections > 0);
         self.warnings.extend(not_mapped_warnings(
             detected.filter_map(|object| Some((object, object.rejected.as_ref()?))),
@@ -261,26 +292,46 @@ fn image_warning(sequence: &Sequence) -> Option<Warning> {
     is_too_many.then_some(Warning::OutsideImage { outside, boxes, image: [width, height] })
 }
 
-/// Returns warnings about unused detections, one per reason.
-fn unused_warnings(sequence: &Sequence, without_area: usize) -> Vec<Warning> {
+/// Returns warnings about unused input, one per reason.
+fn unused_warnings<'a>(all: impl Iterator<Item = &'a UnusedInput>, without_area: usize) -> Vec<Warning> {
     let mut warnings = vec![];
     let (mut boxes, mut first) = (0, None);
-    for unused in &sequence.unused {
+    let (mut changes, mut first_change) = (0, None);
+    let (mut images, mut first_image) = ((0, 0), None);
+    for unused in all {
         match unused {
-            UnusedDetection::WithoutPose(without) if without.is_too_many() => {
+            UnusedInput::WithoutPose(without) if without.is_too_many() => {
                 warnings.push(Warning::TooManyUnused { what: without.to_string(), allowed: without.allowed });
             }
-            UnusedDetection::WithoutPose(without) => {
+            UnusedInput::WithoutPose(without) => {
                 warnings.push(Warning::Unused { what: without.to_string() });
             }
-            UnusedDetection::Box { timestamp, place, fault } => {
+            UnusedInput::Box { timestamp, place, fault } => {
                 boxes += 1;
                 first.get_or_insert_with(|| format!("box {place} at {timestamp} s: {fault}"));
+            }
+            UnusedInput::Image { boxes, fault } => {
+                images = (images.0 + 1, images.1 + boxes);
+                first_image.get_or_insert(fault);
+            }
+            UnusedInput::PoseGraph { timestamp, field, fault } => {
+                changes += 1;
+                first_change.get_or_insert_with(|| format!("{field} at {timestamp} s: {fault}"));
             }
         }
     }
     if let Some(first) = first {
         let what = format!("boxes that cannot be read are left out: {boxes}, the first {first}");
+        warnings.push(Warning::Unused { what });
+    }
+    if let Some(first) = first_image {
+        let (images, boxes) = images;
+        let what =
+            format!("images without a pose are left out: {images}, with {boxes} boxes; the first: {first}");
+        warnings.push(Warning::Unused { what });
+    }
+    if let Some(first) = first_change {
+        let what = format!("changes of the pose graph are left out: {changes}, the first {first}");
         warnings.push(Warning::Unused { what });
     }
     if without_area > 0 {
@@ -360,15 +411,19 @@ pub fn prior_object_entry(object: &PriorObject, settings: &RunSettings) -> Facto
     }
 }
 
-/// Returns the step between two frames for a motion model.
+/// Returns the step between two frames for a motion model. Its noise is that of the later frame, unless that is
+/// not given or the noise is estimated.
 pub fn motion_step<'a>(
     frames: [usize; 2],
-    [from, to]: [&Frame; 2],
-    settings: &'a OdometrySettings,
+    [from, to]: [&'a Frame; 2],
+    settings: &'a RunSettings,
     estimates: &'a dyn Fn(&str) -> Option<Box<dyn Variable>>,
 ) -> MotionStep<'a> {
     let pose = from.world_from_camera.between(&to.world_from_camera);
-    let odometry = RelativePose { pose, noise: &settings.noise, loss: settings.loss.as_ref() };
+    let is_estimated = settings.variance_components.as_ref().is_some_and(|variance| variance.odometry);
+    let OdometrySettings { noise, loss } = &settings.odometry;
+    let noise = to.odometry_noise.as_deref().filter(|_| !is_estimated).unwrap_or(noise);
+    let odometry = RelativePose { pose, noise, loss: loss.as_ref() };
     MotionStep { frames, seconds: to.timestamp - from.timestamp, odometry, estimates }
 }
 

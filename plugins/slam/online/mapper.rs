@@ -8,6 +8,7 @@ mod frame;
 mod gravity;
 mod locate;
 mod object;
+mod pose_graph;
 mod present;
 mod revision;
 
@@ -29,7 +30,7 @@ use manifactor_mapping::semantics::RuleError;
 use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::{Camera, DualQuadric};
 use manifactor_recording::sequence::{Frame, ObjectId, Observation, Sequence, SequenceHeader};
-use manifactor_smoother::{ChangeError, Smoother, UpdateError, UpdateReport};
+use manifactor_smoother::{ChangeError, FactorId, Smoother, UpdateError, UpdateReport};
 use manifactor_solve::Observer;
 use object::ObjectState;
 use std::any::TypeId;
@@ -41,7 +42,7 @@ pub use locate::Relocalization;
 
 /// A map that grows with each frame.
 ///
-/// It keeps the data for a batch solve at the end: about 70 bytes per frame, and 50 per box. With data
+/// It keeps the data for a batch solve at the end: about 140 bytes per frame, and 50 per box. With data
 /// association, it also keeps each object with its detections. Everything else is bounded by the window of
 /// the smoother, if there is one.
 #[derive(Debug)]
@@ -61,8 +62,12 @@ pub struct Mapper {
     measurements: Measurements,
     objects: BTreeMap<ObjectId, ObjectState>,
     semantic_factors: SemanticFactors,
-    /// The last accepted frame.
-    last: Option<Frame>,
+    /// The accepted frames, with corrected odometry.
+    frames: Vec<Frame>,
+    /// True if the odometry of earlier frames was corrected.
+    is_corrected: bool,
+    /// Factors on poses that can be replaced or removed by id.
+    pose_factors: BTreeMap<String, FactorId>,
     /// Pose estimates at the time of their frames.
     live_poses: Vec<StampedPose>,
 }
@@ -152,19 +157,25 @@ impl Mapper {
             objects: objects.collect(),
             measurements,
             semantic_factors: SemanticFactors::default(),
-            last: None,
+            frames: vec![],
+            is_corrected: false,
+            pose_factors: BTreeMap::new(),
             live_poses: vec![],
         }
     }
 
     /// Adds a frame: its pose, and its boxes of mapped objects; then objects that can be initialized with it.
-    /// The `association` of the settings assigns the boxes to objects.
+    /// The `association` of the settings assigns the boxes to objects. Changes of the pose graph are applied even if
+    /// the frame is rejected: corrected poses before it, factors after it.
     ///
     /// # Errors
-    /// If the pose is rejected. Rejected boxes are not an error: the report lists them.
+    /// If the pose is rejected. Rejected boxes and changes are not an error: the report lists them.
     pub fn add_frame(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
         let mut report = FrameReport::new(self.live_poses.len(), observation.frame.timestamp);
-        let seen = self.add_pose(observation, &mut report)?;
+        self.correct_poses(&observation.pose_graph.corrected, &mut report);
+        let seen = self.add_pose(observation, &mut report);
+        self.apply_pose_factors(&observation.pose_graph, &mut report);
+        let seen = seen?;
         self.update_objects(seen, &mut report);
         report.pose = self.pose(report.frame).unwrap_or(report.pose);
         self.live_poses.push(StampedPose { timestamp: report.timestamp, pose: report.pose });
@@ -191,7 +202,7 @@ impl Mapper {
     /// reported as those of the last frame.
     pub fn finish_association(&mut self) -> FrameReport {
         let frame = self.live_poses.len();
-        let last = self.last.as_ref().map_or(0.0, |last| last.timestamp);
+        let last = self.frames.last().map_or(0.0, |last| last.timestamp);
         let mut report = FrameReport::new(frame.saturating_sub(1), last);
         let known = AssociationContext {
             newest: (frame, Se3::identity()),
@@ -269,7 +280,14 @@ impl Mapper {
         observer: &mut dyn Observer,
     ) -> Result<Estimate, FinishError> {
         let frame = self.up.map_frame().ok_or(MappingError::NoFrames)?;
-        let poses: Vec<Se3> = (0..self.live_poses.len()).filter_map(|i| self.pose_of(i)).collect();
+        let start_of_pose = |i: usize| match self.frames.get(i).filter(|_| self.is_corrected) {
+            // the estimate at the time is older than the correction
+            Some(corrected) => {
+                Some(self.pose(i).unwrap_or(frame.map_from_odometry.compose(&corrected.world_from_camera)))
+            }
+            None => self.pose_of(i),
+        };
+        let poses: Vec<Se3> = (0..self.live_poses.len()).filter_map(start_of_pose).collect();
         let start = |measured: &ObjectMeasurements| match self
             .objects
             .get(&measured.id)
@@ -311,7 +329,7 @@ impl Mapper {
     /// Returns the estimate of a pose with its time. Includes the frame in progress.
     fn stamped_pose(&self, frame: usize) -> Option<StampedPose> {
         let timestamp = self.live_poses.get(frame).map(|live| live.timestamp);
-        let newest = self.last.as_ref().map(|last| last.timestamp);
+        let newest = self.frames.last().map(|last| last.timestamp);
         Some(StampedPose { timestamp: timestamp.or(newest)?, pose: self.pose(frame)? })
     }
 

@@ -12,6 +12,7 @@ pub mod class;
 pub mod fusion;
 pub mod keys;
 pub mod measurement;
+pub mod pose_graph;
 pub mod prior_map;
 pub mod recording;
 pub mod sequence;

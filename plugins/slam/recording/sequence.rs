@@ -4,13 +4,15 @@
 //! `world_from_camera` maps a point in the camera frame to the world frame. The camera looks along +z; in the
 //! image x points right and y down.
 use crate::measurement::Quantities;
+use crate::pose_graph::{PoseFactor, PoseGraphChanges};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
-use manifactor_graph::Direction;
+use manifactor_graph::{Direction, Noise};
 use manifactor_quadric::{BoundingBox, Box3, Camera};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::sync::Arc;
 
 mod observations;
 
@@ -32,13 +34,15 @@ pub struct Sequence {
     pub accelerometer: Vec<Acceleration>,
     /// Ground truth to compare the estimate with.
     pub ground_truth: Option<GroundTruth>,
-    /// Detections that the source contains but does not use.
-    pub unused: Vec<UnusedDetection>,
+    /// Factors on poses in addition to odometry, each with the index of the frame with which it arrived.
+    pub pose_factors: Vec<(usize, PoseFactor)>,
+    /// Input that the source contains but does not use.
+    pub unused: Vec<UnusedInput>,
 }
 
-/// Unused detections of a source, with the reason.
+/// Unused input of a source, with the reason.
 #[derive(Debug, Clone, PartialEq)]
-pub enum UnusedDetection {
+pub enum UnusedInput {
     /// Rows of a file whose time has no pose.
     WithoutPose(DetectionsWithoutPose),
     /// A box that cannot be read.
@@ -47,6 +51,22 @@ pub enum UnusedDetection {
         timestamp: f64,
         /// Position in the frame, from 1.
         place: usize,
+        /// The fault, with the expected form.
+        fault: String,
+    },
+    /// An image without a pose.
+    Image {
+        /// Number of its boxes.
+        boxes: usize,
+        /// The fault, with the time and the remedy.
+        fault: String,
+    },
+    /// A change of the pose graph, or the noise of the odometry, that cannot be read or applied.
+    PoseGraph {
+        /// Timestamp of its frame. Unit: seconds.
+        timestamp: f64,
+        /// Its field, and its position in a list from 1.
+        field: String,
         /// The fault, with the expected form.
         fault: String,
     },
@@ -63,6 +83,8 @@ pub struct DetectionsWithoutPose {
     pub allowed: f64,
     /// Largest time difference of a match. Unit: seconds.
     pub within: f64,
+    /// True if poses are interpolated: then `within` is the largest time between two poses.
+    pub is_interpolated: bool,
     /// The row without a pose that is closest to one: its timestamp, and its distance from the pose. Unit:
     /// seconds.
     pub nearest: (f64, f64),
@@ -78,6 +100,13 @@ impl DetectionsWithoutPose {
 impl fmt::Display for DetectionsWithoutPose {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { rows, of, within, nearest: (at, away), .. } = self;
+        if self.is_interpolated {
+            return write!(
+                f,
+                "{rows} of {of} detections are not between two poses at most {within} s apart and are left out; \
+                 `source.max_pose_gap` sets the limit"
+            );
+        }
         write!(
             f,
             "{rows} of {of} detections have no pose within {within} s and are left out; the closest, at {at} s, is {away:.6} s away \
@@ -106,8 +135,10 @@ pub struct Observation {
     pub detections: Vec<Detection>,
     /// Readings of the accelerometer since the previous frame.
     pub accelerometer: Vec<Acceleration>,
-    /// Boxes that cannot be used.
-    pub unused: Vec<UnusedDetection>,
+    /// Changes of the pose graph.
+    pub pose_graph: PoseGraphChanges,
+    /// Input of the frame that cannot be used.
+    pub unused: Vec<UnusedInput>,
 }
 
 impl SequenceHeader {
@@ -126,6 +157,7 @@ impl SequenceHeader {
             up,
             accelerometer: vec![],
             ground_truth,
+            pose_factors: vec![],
             unused: vec![],
         }
     }
@@ -158,6 +190,29 @@ pub struct Frame {
     /// Dead-reckoned pose in a world frame that the odometry chooses. The measurement is the relative pose of
     /// consecutive frames.
     pub world_from_camera: Se3,
+    /// Noise of the step from the previous frame, rotation before translation. Unit: rad, m. `None`: the noise
+    /// of the settings.
+    pub odometry_noise: Option<Arc<Noise>>,
+}
+
+impl Frame {
+    /// Creates a frame whose odometry has the noise of the settings.
+    pub fn new(timestamp: f64, world_from_camera: Se3) -> Self {
+        Self { timestamp, world_from_camera, odometry_noise: None }
+    }
+}
+
+impl Observation {
+    /// Creates an image without boxes.
+    pub fn new(frame: Frame) -> Self {
+        Self {
+            frame,
+            detections: vec![],
+            accelerometer: vec![],
+            pose_graph: PoseGraphChanges::default(),
+            unused: vec![],
+        }
+    }
 }
 
 /// One box from a detector, with or without the object that it shows.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 mod assemble;
 mod camera;
+mod interpolation;
 pub mod journal;
 mod json_lines;
 mod recorded;
@@ -15,6 +16,7 @@ pub mod stream;
 mod tum;
 
 pub use camera::CameraChoice;
+pub use interpolation::NoPose;
 pub use json_lines::parse;
 pub use json_lines::{JsonLines, format_line};
 pub use recorded::RecordedFiles;
@@ -137,7 +139,7 @@ pub enum SourceError {
     /// Detections that match no frame.
     #[error(
         "{}: none of {detections} detections was made within {within} s of a pose in {}{}: do the two belong to the same \
-         sequence? `max_time_difference` allows for more", file.display(), odometry.display(), closest(*nearest)
+         sequence? `{setting}` allows for more", file.display(), odometry.display(), closest(*nearest)
     )]
     NothingMatches {
         /// File of the detections.
@@ -148,6 +150,8 @@ pub enum SourceError {
         detections: usize,
         /// Largest time difference of a match. Unit: seconds.
         within: f64,
+        /// Setting of this limit.
+        setting: &'static str,
         /// Detection closest to a pose: its timestamp, and the distance from the pose. Unit: seconds.
         nearest: Option<(f64, f64)>,
     },
@@ -199,6 +203,18 @@ pub enum SourceError {
         /// The error in the last line.
         message: String,
     },
+    /// An image between poses that are too far apart, or outside of them.
+    #[error(
+        "the image at {timestamp} s is left out, with {boxes} boxes: {}; `source.max_pose_gap` sets the limit", no_pose(*why)
+    )]
+    ImageWithoutPose {
+        /// Timestamp of the image. Unit: seconds.
+        timestamp: f64,
+        /// Number of its boxes.
+        boxes: usize,
+        /// The reason.
+        why: NoPose,
+    },
     /// A stream that can be read only once and has been read already.
     #[error("{} can be read once, and another variant has read it: run one variant, or give `file`", file.display())]
     ReadBefore {
@@ -236,6 +252,14 @@ fn closest(nearest: Option<(f64, f64)>) -> String {
         ""
     };
     format!(" (the closest, at {at} s, is {away:.6} s away{unit})")
+}
+
+fn no_pose(why: NoPose) -> String {
+    match why {
+        NoPose::Before => "there is no pose before it".into(),
+        NoPose::After => "there is no pose after it".into(),
+        NoPose::Gap(gap) => format!("the poses before and after it are {gap:.3} s apart"),
+    }
 }
 
 fn paths(tried: &[PathBuf]) -> String {

@@ -126,7 +126,7 @@ impl SimulatedSource {
                 }
                 _ => *pose,
             };
-            frames.push(Frame { timestamp: time(i), world_from_camera });
+            frames.push(Frame::new(time(i), world_from_camera));
         }
         let stamped = |(i, pose): (usize, &_)| StampedPose { timestamp: time(i), pose: *pose };
         let [mut imagination, mistakes, mut felt, depths] = [(); 4].map(|()| Pcg64::from_rng(&mut noise));
@@ -150,6 +150,7 @@ impl SimulatedSource {
             up: Some(Direction::Z),
             accelerometer: readings.unwrap_or_default(),
             ground_truth: Some(truth),
+            pose_factors: vec![],
             unused: vec![],
         })
     }

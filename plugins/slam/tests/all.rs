@@ -14,6 +14,7 @@ mod ground_robots;
 mod motion;
 mod moved;
 mod online;
+mod pose_graph;
 mod prior_map;
 mod simulation;
 mod tum;

@@ -111,14 +111,14 @@ pub(crate) fn both(
 }
 
 /// Returns the settings of a document without variants, and its sequence.
-fn scene(text: &str) -> (RunSettings, Sequence) {
+pub(crate) fn scene(text: &str) -> (RunSettings, Sequence) {
     let settings = run_of(text, &[]).variants.remove(0).settings;
     let sequence = settings.source.load(&InputFolders::default()).unwrap();
     (settings, sequence)
 }
 
 /// Returns the estimate after these frames as text with all digits.
-fn mapped(mapper: &mut Mapper) -> String {
+pub(crate) fn mapped(mapper: &mut Mapper) -> String {
     let values = mapper.smoother().estimates();
     values.iter().map(|(key, value)| format!("{key} {}\n", serde_json::to_string(value).unwrap())).collect()
 }
@@ -271,9 +271,7 @@ fn rejected_boxes_are_reported_and_the_pose_is_accepted() {
         bounding_box: BoundingBox { xmin: 1e200, ymin: 1e200, xmax: 2e200, ymax: 2e200 },
     };
     let measured = mapper.measurements().clone();
-    let taken = mapper
-        .add_frame(&Observation { frame, detections: vec![far], accelerometer: vec![], unused: vec![] })
-        .unwrap();
+    let taken = mapper.add_frame(&Observation { detections: vec![far], ..Observation::new(frame) }).unwrap();
     assert!(taken.refused.len() == 1 && taken.refused[0].starts_with("the boxes at"), "{:?}", taken.refused);
     assert_eq!(taken.box_objects, [None], "they are of no object");
     assert_eq!(*mapper.measurements(), measured);
@@ -291,14 +289,12 @@ fn a_pose_that_cannot_be_taken_is_an_error_and_the_stream_goes_on() {
     // the jump of the camera is too large to be squared
     frame.world_from_camera = Se3::new(frame.world_from_camera.rotation, nalgebra::Vector3::repeat(1e200));
     let detections: Vec<Detection> = last.detections;
-    let taken = mapper.add_frame(&Observation { frame, detections, accelerometer: vec![], unused: vec![] });
+    let taken = mapper.add_frame(&Observation { detections, ..Observation::new(frame) });
     assert!(matches!(taken, Err(FrameError::Update(_))), "{taken:?}");
     // the stream continues from the frame before
     let mut next = sequence.frames.last().unwrap().clone();
     next.timestamp += 2.0;
-    let taken = mapper
-        .add_frame(&Observation { frame: next, detections: vec![], accelerometer: vec![], unused: vec![] })
-        .unwrap();
+    let taken = mapper.add_frame(&Observation::new(next)).unwrap();
     assert_eq!((taken.frame, taken.refused.len()), (80, 0));
 }
 
@@ -309,12 +305,8 @@ fn a_pose_that_overflows_leaves_nothing_behind_in_the_smoother() {
     let mut frame = sequence.frames.last().unwrap().clone();
     let start = frame.timestamp;
     frame.world_from_camera.translation = nalgebra::Vector3::repeat(f64::MAX);
-    let observation = |frame: &Frame, seconds: f64| Observation {
-        frame: Frame { timestamp: start + seconds, ..frame.clone() },
-        detections: vec![],
-        accelerometer: vec![],
-        unused: vec![],
-    };
+    let observation =
+        |frame: &Frame, seconds: f64| Observation::new(Frame { timestamp: start + seconds, ..frame.clone() });
     let taken = mapper.add_frame(&observation(&frame, 2.0));
     assert!(matches!(taken, Err(FrameError::NotFinite { .. })), "{taken:?}");
     mapper.smoother().save().unwrap();

@@ -85,7 +85,7 @@ fn main() {
     let (poses, labels) = (poses(&read("orbslam3_poses")), labels(&read("label_02")));
     let still = still(&labels, &poses);
     let mut recorded = SequenceHeader::new(CAMERA).into_sequence();
-    let frame = |(i, pose): (usize, &Se3)| Frame { timestamp: i as f64 * INTERVAL, world_from_camera: *pose };
+    let frame = |(i, pose): (usize, &Se3)| Frame::new(i as f64 * INTERVAL, *pose);
     recorded.frames = poses.iter().enumerate().map(frame).collect();
     let mut named = 0;
     for line in read("pointrcnn_car").lines() {

@@ -32,8 +32,8 @@ pub fn prior_map(data: &[u8]) {
     let settings = &run.variants[0].settings;
     let mut mapper = Mapper::new(SequenceHeader::new(super::stream::camera()), settings);
     for timestamp in [0.0, 1.0] {
-        let frame = Frame { timestamp, world_from_camera: Se3::identity() };
-        let observation = Observation { frame, detections: vec![], accelerometer: vec![], unused: vec![] };
+        let frame = Frame::new(timestamp, Se3::identity());
+        let observation = Observation::new(frame);
         // a map whose numbers overflow is refused with the first frame
         let _ = mapper.add_frame(&observation);
         is_finite(&mapper.smoother().estimates());

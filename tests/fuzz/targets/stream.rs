@@ -68,10 +68,8 @@ fn kept(bytes: &[u8]) {
     assert!(bytes.starts_with(&whole) || whole.starts_with(bytes), "a journal has other lines");
     let had: HashSet<u64> = before.iter().map(|frame| frame.frame.timestamp.to_bits()).collect();
     let new = [1.0, 1e300, f64::NAN, 2.0].map(|timestamp| Observation {
-        frame: Frame { timestamp, world_from_camera: Se3::identity() },
         detections: before.first().map_or(vec![], |frame| frame.detections.clone()),
-        accelerometer: vec![],
-        unused: vec![],
+        ..Observation::new(Frame::new(timestamp, Se3::identity()))
     });
     let all = read(&new).unwrap_or_else(|e| panic!("{e}"));
     let is_new = |frame: &&Observation| !had.contains(&frame.frame.timestamp.to_bits());
@@ -117,6 +115,7 @@ fn lines(folder: &Path, bytes: &[u8]) -> Vec<Result<Observation, SourceError>> {
         file: Some(file.into()),
         ground_truth: None,
         up: None,
+        max_pose_gap: None,
     };
     let folders = InputFolders { data: None, document: folder.into() };
     let stream = source.open(&folders).unwrap_or_else(|e| panic!("{e}"));

@@ -13,7 +13,7 @@ use manifactor_mapping::mapping::{
 };
 use manifactor_mapping::semantics::RuleError;
 use manifactor_mapping::settings::RunSettings;
-use manifactor_recording::sequence::{Detection, Frame, ObjectId, Observation, UnusedDetection};
+use manifactor_recording::sequence::{Detection, Frame, ObjectId, Observation, UnusedInput};
 use manifactor_smoother::{ChangeError, FactorId, UpdateReport};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -138,7 +138,7 @@ impl Mapper {
         if !(timestamp.is_finite() && frame.world_from_camera.is_finite()) {
             return Err(FrameError::NotFinite { timestamp });
         }
-        if let Some(before) = self.last.as_ref().map(|last| last.timestamp).filter(|t| *t >= timestamp) {
+        if let Some(before) = self.frames.last().map(|last| last.timestamp).filter(|t| *t >= timestamp) {
             return Err(FrameError::Timestamp { timestamp, before });
         }
         let up = self.up.backup_unless_final();
@@ -166,8 +166,9 @@ impl Mapper {
             return Err(FrameError::NotFinite { timestamp });
         }
         report.refused.extend(observation.unused.iter().filter_map(|unused| match unused {
-            UnusedDetection::Box { place, fault, .. } => Some(format!("box {place} is left out: {fault}")),
-            UnusedDetection::WithoutPose(_) => None,
+            UnusedInput::Box { place, fault, .. } => Some(format!("box {place} is left out: {fault}")),
+            UnusedInput::PoseGraph { field, fault, .. } => Some(format!("{field} is left out: {fault}")),
+            UnusedInput::WithoutPose(_) | UnusedInput::Image { .. } => None,
         }));
         self.smoother.set_time(timestamp)?;
         self.smoother.push(&graph, &values)?;
@@ -183,7 +184,7 @@ impl Mapper {
             FrameBoxes { boxes: self.boxes_by_object(&named), corrections: Corrections::default(), up_moved };
         report.boxes = seen.boxes.len();
         let is_taken = self.update_smoother(&seen.boxes, corrected, (&graph, &values), report)?;
-        self.last = Some(frame.clone());
+        self.frames.push(frame.clone());
         if is_taken {
             for detection in &named {
                 let RunSettings { detections, aliases, .. } = &*self.settings;
@@ -213,12 +214,12 @@ impl Mapper {
     ) -> Result<(Graph, Values), FrameError> {
         let map = self.up.map_frame().unwrap_or_else(|| MapFrame::of_odometry(None));
         let (mut graph, mut values) = (Graph::new(), Values::new());
-        report.pose = match &self.last {
+        report.pose = match self.frames.last() {
             Some(last) => {
                 let from = self.pose(report.frame - 1).unwrap_or_else(Se3::identity);
                 let estimates = |key: &str| self.smoother.estimate(key);
                 let frames = [report.frame - 1, report.frame];
-                let step = motion_step(frames, [last, frame], &self.settings.odometry, &estimates);
+                let step = motion_step(frames, [last, frame], &self.settings, &estimates);
                 let motion = &self.settings.motion;
                 let pose = motion.predict(&step, &from);
                 graph.factors_mut().extend(motion.factors(&step)?);

@@ -1,5 +1,6 @@
 //! The frames of a sequence, one by one.
-use super::{Detection, Observation, Sequence};
+use super::{Detection, Observation, Sequence, UnusedInput};
+use crate::pose_graph::{PoseFactor, PoseGraphChanges, correct_frames};
 
 /// Frames of a sequence in order of arrival. A reading of the accelerometer belongs to the first frame at or
 /// after its time.
@@ -8,11 +9,12 @@ pub(crate) struct Observations<S> {
     frames: usize,
     boxes: usize,
     readings: usize,
+    pose_factors: usize,
 }
 
 impl<S: AsRef<Sequence>> Observations<S> {
     pub(crate) fn from_sequence(sequence: S) -> Self {
-        Self { sequence, frames: 0, boxes: 0, readings: 0 }
+        Self { sequence, frames: 0, boxes: 0, readings: 0, pose_factors: 0 }
     }
 }
 
@@ -28,6 +30,10 @@ impl<S: AsRef<Sequence>> Iterator for Observations<S> {
         let felt = sequence.accelerometer.get(self.readings..).unwrap_or_default();
         let felt = &felt[..felt.partition_point(|reading| reading.timestamp <= frame.timestamp)];
         self.readings += felt.len();
+        let factors = sequence.pose_factors.get(self.pose_factors..).unwrap_or_default();
+        let factors = &factors[..factors.partition_point(|(arrived, _)| *arrived <= self.frames)];
+        self.pose_factors += factors.len();
+        let factors = factors.iter().map(|(_, factor)| factor.clone()).collect();
         self.frames += 1;
         // unused rows of a file belong to no frame; the first frame carries them
         let unused = if self.frames == 1 { sequence.unused.clone() } else { vec![] };
@@ -35,18 +41,45 @@ impl<S: AsRef<Sequence>> Iterator for Observations<S> {
             frame: frame.clone(),
             detections: own.to_vec(),
             accelerometer: felt.to_vec(),
+            pose_graph: PoseGraphChanges { factors, ..PoseGraphChanges::default() },
             unused,
         })
     }
 }
 
 impl Sequence {
-    /// Appends a frame with its boxes and readings.
+    /// Appends a frame with its boxes and readings, and [applies](Self::apply_pose_graph) its changes of the pose
+    /// graph.
     pub fn push(&mut self, observation: Observation) {
         let frame = self.frames.len();
+        let timestamp = observation.frame.timestamp;
+        self.apply_pose_graph(timestamp, observation.pose_graph);
         self.frames.push(observation.frame);
         self.detections.extend(observation.detections.into_iter().map(|d| Detection { frame, ..d }));
         self.accelerometer.extend(observation.accelerometer);
         self.unused.extend(observation.unused);
+    }
+
+    /// Corrects poses, and adds, replaces and removes factors on poses before the next frame. Changes of unknown
+    /// frames and factors become unused input.
+    pub fn apply_pose_graph(&mut self, timestamp: f64, changes: PoseGraphChanges) {
+        let PoseGraphChanges { factors, removed, corrected } = changes;
+        let unused = |field: String, fault: String| UnusedInput::PoseGraph { timestamp, field, fault };
+        let unknown = correct_frames(&mut self.frames, &corrected);
+        self.unused.extend(unknown.iter().map(|error| unused("corrected".into(), error.to_string())));
+        let has = |id: &str, factor: &PoseFactor| factor.id.as_deref() == Some(id);
+        for id in removed {
+            let before = self.pose_factors.len();
+            self.pose_factors.retain(|(_, factor)| !has(&id, factor));
+            if self.pose_factors.len() == before {
+                self.unused.push(unused(format!("removed `{id}`"), "there is no such factor".into()));
+            }
+        }
+        for factor in factors {
+            if let Some(id) = &factor.id {
+                self.pose_factors.retain(|(_, before)| !has(id, before));
+            }
+            self.pose_factors.push((self.frames.len(), factor));
+        }
     }
 }

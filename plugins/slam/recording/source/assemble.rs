@@ -1,9 +1,10 @@
 //! Frames and detections, matched by time.
 use super::SourceError;
+use super::interpolation::pose_at;
 use crate::measurement::{DepthMeasurement, Quantities};
 use crate::recording::OBJECTS_FILE;
 use crate::sequence::{
-    ClassScores, Detection, DetectionsWithoutPose, Frame, GroundTruth, ObjectId, TrueObject, UnusedDetection,
+    ClassScores, Detection, DetectionsWithoutPose, Frame, GroundTruth, ObjectId, TrueObject, UnusedInput,
 };
 use manifactor_config::{Document, Errors};
 use manifactor_formats::tum::{StampedPose, Trajectory};
@@ -13,7 +14,7 @@ use manifactor_quadric::BoundingBox;
 use std::path::Path;
 
 /// Frames, their detections, and the detections without a frame.
-pub(super) type MatchedDetections = (Vec<Frame>, Vec<Detection>, Vec<UnusedDetection>);
+pub(super) type MatchedDetections = (Vec<Frame>, Vec<Detection>, Vec<UnusedInput>);
 
 /// Limits for matching detections with frames by time.
 #[derive(Debug, Clone, Copy)]
@@ -22,6 +23,18 @@ pub(super) struct TimeMatching {
     pub within: NotNegative,
     /// Largest expected share of detections without a frame.
     pub without_pose: Share,
+    /// Largest time between two poses, to interpolate between them. Unit: seconds.
+    pub max_pose_gap: Option<Positive>,
+}
+
+impl TimeMatching {
+    /// Returns the limit in seconds, and the name of its setting.
+    fn limit(&self) -> (f64, &'static str) {
+        match self.max_pose_gap {
+            Some(gap) => (gap.get(), "max_pose_gap"),
+            None => (*self.within, "max_time_difference"),
+        }
+    }
 }
 
 /// Returns the default: a tenth of the detections may lack an odometry pose, as at the beginning of a
@@ -48,43 +61,64 @@ pub(super) fn read_matched(
     by: TimeMatching,
 ) -> Result<MatchedDetections, SourceError> {
     let within = *by.within;
-    let frames = read_poses(odometry)?.into_iter();
-    let frames = frames.map(|StampedPose { timestamp, pose }| Frame { timestamp, world_from_camera: pose });
-    let frames: Vec<Frame> = frames.collect();
-    let rows = detections::read(file)?;
+    let (poses, rows) = (read_poses(odometry)?, detections::read(file)?);
+    let frames: Vec<Frame> = match by.max_pose_gap {
+        Some(gap) => interpolated_frames(&poses, &rows, gap.get()),
+        None => poses.iter().map(|pose| Frame::new(pose.timestamp, pose.pose)).collect(),
+    };
+    let times: Vec<f64> = frames.iter().map(|frame| frame.timestamp).collect();
     let mut matched = vec![];
     for row in &rows {
-        if let Some((frame, _)) = nearest(&frames, row.timestamp).filter(|(_, away)| *away <= within) {
+        if let Some((frame, _)) = nearest(&times, row.timestamp).filter(|(_, away)| *away <= within) {
             matched.push(detection(frame, row)?);
         }
     }
     if matched.is_empty() && !rows.is_empty() {
         let (file, odometry) = (file.to_owned(), odometry.to_owned());
-        let away = |at: f64| nearest(&frames, at).map(|(_, away)| (at, away));
+        let times: Vec<f64> = poses.iter().map(|pose| pose.timestamp).collect();
+        let away = |at: f64| nearest(&times, at).map(|(_, away)| (at, away));
         let nearest = rows.iter().filter_map(|row| away(row.timestamp)).min_by(|a, b| a.1.total_cmp(&b.1));
-        return Err(SourceError::NothingMatches { file, odometry, detections: rows.len(), within, nearest });
+        let (within, setting) = by.limit();
+        return Err(SourceError::NothingMatches {
+            file,
+            odometry,
+            detections: rows.len(),
+            within,
+            setting,
+            nearest,
+        });
     }
-    let without = without_frame(&frames, &rows, by);
+    let without = without_frame(&times, &rows, by);
     // stable, so that the order of the file decides between duplicates
     matched.sort_by_key(|detection| detection.frame);
-    Ok((frames, matched, without.map(UnusedDetection::WithoutPose).into_iter().collect()))
+    Ok((frames, matched, without.map(UnusedInput::WithoutPose).into_iter().collect()))
+}
+
+/// Returns a frame for each time with detections that lies between two poses.
+fn interpolated_frames(poses: &[StampedPose], rows: &[detections::DetectionRow], max_gap: f64) -> Vec<Frame> {
+    let mut timestamps: Vec<f64> = rows.iter().map(|row| row.timestamp).collect();
+    timestamps.sort_by(f64::total_cmp);
+    timestamps.dedup();
+    let frame = |timestamp: f64| Some(Frame::new(timestamp, pose_at(poses, timestamp, max_gap).ok()?));
+    timestamps.into_iter().filter_map(frame).collect()
 }
 
 /// Returns a summary of the rows without a frame; `None` if there are none.
 fn without_frame(
-    frames: &[Frame],
+    times: &[f64],
     rows: &[detections::DetectionRow],
     by: TimeMatching,
 ) -> Option<DetectionsWithoutPose> {
-    let TimeMatching { within, without_pose: allowed } = by;
-    let away = |row: &detections::DetectionRow| Some((row.timestamp, nearest(frames, row.timestamp)?.1));
+    let TimeMatching { within, without_pose: allowed, .. } = by;
+    let away = |row: &detections::DetectionRow| Some((row.timestamp, nearest(times, row.timestamp)?.1));
     let far: Vec<(f64, f64)> = rows.iter().filter_map(away).filter(|(_, away)| *away > *within).collect();
     let nearest = far.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(DetectionsWithoutPose {
         rows: far.len(),
         of: rows.len(),
         allowed: *allowed,
-        within: *within,
+        within: by.limit().0,
+        is_interpolated: by.max_pose_gap.is_some(),
         nearest,
     })
 }
@@ -99,11 +133,11 @@ fn read_poses(file: &Path) -> Result<Vec<StampedPose>, SourceError> {
     Ok(poses)
 }
 
-/// Returns the frame nearest in time, and its distance in seconds.
-fn nearest(frames: &[Frame], timestamp: f64) -> Option<(usize, f64)> {
-    let after = frames.partition_point(|frame| frame.timestamp < timestamp);
+/// Returns the index of the nearest of some times, which ascend, and its distance in seconds.
+fn nearest(times: &[f64], timestamp: f64) -> Option<(usize, f64)> {
+    let after = times.partition_point(|time| *time < timestamp);
     let candidates = [after.checked_sub(1), Some(after)].into_iter().flatten();
-    let away = candidates.filter_map(|i| Some((i, (frames.get(i)?.timestamp - timestamp).abs())));
+    let away = candidates.filter_map(|i| Some((i, (times.get(i)? - timestamp).abs())));
     away.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -159,16 +193,12 @@ pub(super) fn read_ground_truth(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use manifactor_geometry::Se3;
-
-    fn frames() -> Vec<Frame> {
-        [1.0, 2.0, 3.0].map(|timestamp| Frame { timestamp, world_from_camera: Se3::identity() }).into()
-    }
+    const TIMES: [f64; 3] = [1.0, 2.0, 3.0];
 
     #[test]
-    fn the_nearest_frame_is_taken_if_it_is_near() {
+    fn the_nearest_time_is_taken_if_it_is_near() {
         let found =
-            |timestamp| nearest(&frames(), timestamp).map(|(frame, away)| (frame, (10.0 * away).round()));
+            |timestamp| nearest(&TIMES, timestamp).map(|(frame, away)| (frame, (10.0 * away).round()));
         assert_eq!([found(2.4), found(2.6), found(0.9)], [Some((1, 4.0)), Some((2, 4.0)), Some((0, 1.0))]);
         assert_eq!(found(9.0), Some((2, 60.0)));
         assert_eq!(nearest(&[], 1.0), None);

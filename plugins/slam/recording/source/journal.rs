@@ -115,7 +115,7 @@ mod tests {
         for i in 0..12 {
             let t = f64::from(i) / 7.0;
             let world_from_camera = Se3::exp(&Vector6::new(0.1 * t, 0.2, 0.3, t, 0.5, 0.6 * t));
-            sequence.frames.push(Frame { timestamp: 10.0 + t, world_from_camera });
+            sequence.frames.push(Frame::new(10.0 + t, world_from_camera));
             for (object, left) in [(1, 100.0), (2, 300.0)] {
                 let bounding_box = BoundingBox::new([left + 3.0 * t, 120.0, left + 80.5, 200.0 + t]).unwrap();
                 sequence.detections.push(Detection {

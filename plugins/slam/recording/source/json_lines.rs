@@ -1,19 +1,12 @@
 use super::assemble::read_ground_truth;
+use super::interpolation::{InterpolatedFrames, PoseOrImage};
 use super::rectification::Rectification;
 use super::stream::FrameStream;
 use super::{CameraChoice, InputFolders, SequenceSource, SourceError, check_files};
-use crate::measurement::Quantities;
-use crate::sequence::{
-    Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Sequence, SequenceHeader,
-    UnusedDetection,
-};
-use indexmap::IndexMap;
+use crate::sequence::{Observation, Sequence, SequenceHeader};
 use manifactor_formats::FormatError;
-use manifactor_geometry::Se3;
-use manifactor_graph::checked::Share;
+use manifactor_graph::checked::Positive;
 use manifactor_graph::{Direction, register};
-use manifactor_quadric::BoundingBox;
-use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -21,12 +14,30 @@ use std::io::{BufRead, BufReader, Read, stdin};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+mod line;
+
+pub use line::{format_line, parse};
+
 /// Frames as lines of JSON, read one by one as they arrive: from standard input, or from a file.
 ///
 /// A line contains the time, the odometry pose (from the camera frame, z forward, to a world frame that the
 /// odometry chooses), and the boxes. Each box has a class and its score, or the scores of several classes.
 /// Optional fields: the `object` that a box shows; its `depth`, the distance of the centre along the optical
 /// axis in metres, or another registered measurement; accelerometer readings since the previous line.
+///
+/// A SLAM system that provides the odometry can add to a line:
+/// - `odometry_noise`: noise of the step from the previous frame, rotation before translation. Unit: rad, m.
+/// - `factors`: loop closures, positions, markers and other factors on poses, with the `type` and parameters of
+///   any registered factor and a noise. `keys` are timestamps of frames, and names of variables of the document.
+///   A factor with the `id` of an earlier one replaces it.
+/// - `removed`: ids of factors to remove.
+/// - `corrected`: corrected poses of earlier frames. `pose` refers to the corrected odometry frame.
+///
+/// With `max_pose_gap`, poses and images may have different timestamps, at different rates. A line has `pose`,
+/// `boxes` or both. An image waits for the first pose after it, and may arrive ten seconds late. An image
+/// without poses around it is skipped and reported.
+///
+/// An item of these lists that cannot be used is skipped and reported; the frame stays.
 ///
 /// ```json
 /// {"timestamp": 0.1, "pose": {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0]}, "boxes": [{"box": [10.0, 20.0, 90.0, 80.0], "class": "cup", "score": 0.8}]}
@@ -52,160 +63,11 @@ pub struct JsonLines {
     /// Up direction in the odometry frame, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub up: Option<Direction>,
-}
-
-/// A frame in the form of a line.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Line {
-    /// Timestamp. Unit: seconds.
-    timestamp: f64,
-    pose: Se3,
-    #[serde(default)]
-    boxes: Vec<serde_json::Value>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    accelerometer: Vec<AccelerometerReading>,
-}
-
-/// A box in the form of a line; `quantities` collects all further fields.
-#[derive(Debug, Serialize, Deserialize)]
-struct LineBox {
-    #[serde(rename = "box")]
-    bounding_box: BoundingBox,
+    /// Largest time between two poses, to interpolate the pose of an image between them. Then poses and boxes may
+    /// come on separate lines, and lines without `boxes` add no frame. Default: each line is a frame with its
+    /// pose. Unit: seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    class: Option<String>,
-    #[serde(default = "certain_score", skip_serializing_if = "is_certain")]
-    score: Share,
-    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
-    scores: IndexMap<String, f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    object: Option<ObjectId>,
-    #[serde(flatten)]
-    quantities: IndexMap<String, serde_json::Value>,
-}
-
-/// Fields of a box besides its measurements.
-const FIELDS: [&str; 5] = ["box", "class", "score", "scores", "object"];
-
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct AccelerometerReading {
-    timestamp: f64,
-    acceleration: Vector3<f64>,
-}
-
-fn certain_score() -> Share {
-    Share::literal(1.0)
-}
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
-fn is_certain(score: &Share) -> bool {
-    **score >= 1.0
-}
-
-/// Returns a frame as a line for this source, without the line end.
-pub fn format_line(observation: &Observation) -> String {
-    let of_box = |detection: &Detection| {
-        let scores: IndexMap<String, f64> = detection.scores.iter().map(|(c, s)| (c.to_owned(), s)).collect();
-        let first = scores.first().filter(|_| scores.len() == 1);
-        let single = first.and_then(|(class, score)| Some((class.clone(), Share::new(*score).ok()?)));
-        LineBox {
-            bounding_box: detection.bounding_box,
-            scores: if single.is_some() { IndexMap::new() } else { scores },
-            score: single.as_ref().map_or_else(certain_score, |(_, score)| *score),
-            class: single.map(|(class, _)| class),
-            object: detection.object,
-            quantities: detection.quantities.to_fields().collect(),
-        }
-    };
-    let of_reading =
-        |r: &Acceleration| AccelerometerReading { timestamp: r.timestamp, acceleration: r.acceleration };
-    let line = Line {
-        timestamp: observation.frame.timestamp,
-        pose: observation.frame.world_from_camera,
-        boxes: observation
-            .detections
-            .iter()
-            .map(of_box)
-            .filter_map(|b| serde_json::to_value(b).ok())
-            .collect(),
-        accelerometer: observation.accelerometer.iter().map(of_reading).collect(),
-    };
-    serde_json::to_string(&line).unwrap_or_default()
-}
-
-/// Reads a frame from such a line.
-pub fn parse(line: &[u8]) -> Result<Observation, String> {
-    let read = serde_json::from_slice(line).or_else(|error| match without_infinities(line) {
-        Some(text) => serde_json::from_str(&text),
-        None => Err(error),
-    });
-    let Line { timestamp, pose, boxes, accelerometer } =
-        read.map_err(|error: serde_json::Error| error.to_string())?;
-    let (mut detections, mut unused) = (vec![], vec![]);
-    for (place, value) in boxes.into_iter().enumerate() {
-        match LineBox::read(value) {
-            Ok(seen) => detections.push(seen),
-            Err(fault) => unused.push(UnusedDetection::Box { timestamp, place: place + 1, fault }),
-        }
-    }
-    let of_reading =
-        |r: AccelerometerReading| Acceleration { timestamp: r.timestamp, acceleration: r.acceleration };
-    Ok(Observation {
-        frame: Frame { timestamp, world_from_camera: pose },
-        detections,
-        accelerometer: accelerometer.into_iter().map(of_reading).collect(),
-        unused,
-    })
-}
-
-/// Returns the line with `null` in place of each non-finite number; `None` if all numbers are finite. JSON
-/// has no such numbers, but programs in several languages write them. A field that needs a number rejects
-/// `null`; in a box this rejects only the box.
-fn without_infinities(line: &[u8]) -> Option<String> {
-    let text = std::str::from_utf8(line).ok()?;
-    let (mut out, mut word, mut found) = (String::with_capacity(text.len()), String::new(), false);
-    let (mut is_text, mut is_escaped) = (false, false);
-    for c in text.chars().chain(['\n']) {
-        if !is_text && (c.is_ascii_alphanumeric() || ['+', '-', '.'].contains(&c)) {
-            word.push(c);
-            continue;
-        }
-        if !word.is_empty() {
-            let is_infinite = word.parse::<f64>().is_ok_and(|number| !number.is_finite());
-            found |= is_infinite;
-            out += if is_infinite { "null" } else { &word };
-            word.clear();
-        }
-        match c {
-            '"' if !is_escaped => is_text = !is_text,
-            _ => {}
-        }
-        is_escaped = is_text && c == '\\' && !is_escaped;
-        out.push(c);
-    }
-    found.then_some(out)
-}
-
-impl LineBox {
-    fn read(value: serde_json::Value) -> Result<Detection, String> {
-        let seen: Self = serde_json::from_value(value).map_err(|error| error.to_string())?;
-        if let Some((class, score)) = seen.scores.iter().find(|(_, score)| !(0.0..=1.0).contains(*score)) {
-            return Err(format!("the score of `{class}` must be a number from 0 to 1, got {score}"));
-        }
-        match &seen.class {
-            Some(class) if !seen.scores.is_empty() => {
-                Err(format!("a box has `class` and `score`, or `scores`, and not both: `{class}`"))
-            }
-            _ => seen.into_detection(),
-        }
-    }
-
-    fn into_detection(self) -> Result<Detection, String> {
-        let single = self.class.map(|class| (class, self.score.get()));
-        let scores: ClassScores = self.scores.into_iter().chain(single).collect();
-        let quantities = Quantities::read(self.quantities, &FIELDS)?;
-        Ok(Detection { frame: 0, object: self.object, scores, bounding_box: self.bounding_box, quantities })
-    }
+    pub max_pose_gap: Option<Positive>,
 }
 
 /// True once standard input has been read: it can be read only once.
@@ -260,8 +122,14 @@ impl JsonLines {
             }
             None => (STDIN_NAME.into(), Box::new(BufReader::new(stdin()))),
         };
-        let lines = FrameLines { file, reader, line: 0, text: vec![], unreadable: 0 };
-        let rectified = lines.fuse().map(move |read| {
+        let needs_pose = self.max_pose_gap.is_none();
+        let lines = FrameLines { file, reader, line: 0, text: vec![], unreadable: 0, needs_pose }.fuse();
+        let frames: Box<dyn Iterator<Item = Result<Observation, SourceError>> + Send> =
+            match self.max_pose_gap {
+                Some(gap) => Box::new(InterpolatedFrames::new(lines, gap.get())),
+                None => Box::new(lines.map(|read| read.map(|line| line.observation))),
+            };
+        let rectified = frames.map(move |read| {
             read.map(|mut observation| {
                 lens.apply_to_frame(&mut observation);
                 observation
@@ -279,6 +147,8 @@ struct FrameLines {
     text: Vec<u8>,
     /// Number of consecutive lines before the next one that are not frames.
     unreadable: usize,
+    /// True if each line needs a pose.
+    needs_pose: bool,
 }
 
 impl FrameLines {
@@ -305,8 +175,8 @@ impl FrameLines {
         self.reader = Box::new(std::io::empty());
     }
 
-    /// Returns the frame of the last line that was read.
-    fn parse_frame(&mut self) -> Result<Observation, SourceError> {
+    /// Returns the content of the last line that was read.
+    fn parse_frame(&mut self) -> Result<PoseOrImage, SourceError> {
         let read = self.parse();
         self.unreadable = if read.is_ok() { 0 } else { self.unreadable + 1 };
         let (file, line) = (self.file.clone(), self.line);
@@ -319,16 +189,24 @@ impl FrameLines {
         })
     }
 
-    fn parse(&self) -> Result<Observation, String> {
+    fn parse(&self) -> Result<PoseOrImage, String> {
         if self.text.len() as u64 == MAX_LINE_BYTES {
             return Err(format!("the line is longer than {MAX_LINE_BYTES} bytes"));
         }
-        parse(&self.text)
+        let read = line::parse_line(&self.text)?;
+        match (self.needs_pose, read.has_pose, read.is_image) {
+            (true, false, _) => Err(
+                "missing field `pose`; if poses and boxes come on separate lines, set `source.max_pose_gap`"
+                    .into(),
+            ),
+            (false, false, false) => Err("a line needs `pose`, `boxes` or both".into()),
+            _ => Ok(read),
+        }
     }
 }
 
 impl Iterator for FrameLines {
-    type Item = Result<Observation, SourceError>;
+    type Item = Result<PoseOrImage, SourceError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
@@ -348,6 +226,7 @@ impl Iterator for FrameLines {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sequence::UnusedInput;
     use serde_json::json;
     use std::path::Path;
 
@@ -369,9 +248,7 @@ mod tests {
         let stream = source.open(&folders).unwrap().unwrap();
         let read: Vec<_> = stream.observations.collect();
         assert_eq!(read.iter().map(Result::is_ok).collect::<Vec<_>>(), [true, false, true, true]);
-        let UnusedDetection::Box { place, fault, .. } = &read[2].as_ref().unwrap().unused[0] else {
-            panic!()
-        };
+        let UnusedInput::Box { place, fault, .. } = &read[2].as_ref().unwrap().unused[0] else { panic!() };
         assert!(*place == 1 && fault.contains("expected [xmin, ymin, xmax, ymax]"), "{fault}");
         let error = source.load(&folders).unwrap_err().to_string();
         assert!(error.contains("line 2"), "{error}");
@@ -399,34 +276,5 @@ mod tests {
         let place =
             format!("line {}: {MAX_UNREADABLE_LINES} lines in a row are no frames", MAX_UNREADABLE_LINES + 1);
         assert!(error.contains(&place) && error.contains("check `source.file`"), "{error}");
-    }
-
-    #[test]
-    fn scores_are_from_0_to_1_and_given_once() {
-        let line = |seen: &str| {
-            format!(
-                r#"{{"timestamp": 1.0, "pose": {{"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}, "boxes": [{seen}]}}"#
-            )
-        };
-        let wrong = [
-            (r#"{"box": [1, 1, 5, 5], "class": "cup", "score": 1.7}"#, "0"),
-            (
-                r#"{"box": [1, 1, 5, 5], "scores": {"cup": 1.7}}"#,
-                "the score of `cup` must be a number from 0 to 1",
-            ),
-            (r#"{"box": [1, 1, 5, 5], "class": "cup", "scores": {"cup": 0.7}}"#, "and not both: `cup`"),
-            (r#"{"box": [1, 1, 5, NaN], "class": "Infinity \" NaN"}"#, "null"),
-            (r#"{"box": [1, -Infinity, 5, 5], "class": "cup"}"#, "null"),
-            (r#"{"box": [1, 1, 1e999, 5], "class": "cup"}"#, "null"),
-        ];
-        for (seen, words) in wrong {
-            let good = r#"{"box": [1, 1, 5, 5], "class": "cup"}"#;
-            let read = parse(line(&format!("{seen}, {good}")).as_bytes()).unwrap();
-            let UnusedDetection::Box { place, fault, .. } = &read.unused[0] else { panic!() };
-            assert!(*place == 1 && fault.contains(words) && read.detections.len() == 1, "{fault}");
-        }
-        let two =
-            parse(line(r#"{"box": [1, 1, 5, 5], "scores": {"cup": 0.7, "bowl": 0.2}}"#).as_bytes()).unwrap();
-        assert_eq!(two.detections[0].scores.iter().count(), 2);
     }
 }

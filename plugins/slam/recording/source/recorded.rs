@@ -5,7 +5,7 @@ use super::camera::CameraChoice;
 use super::rectification::{Distortion, Rectification};
 use super::{InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::Sequence;
-use manifactor_graph::checked::{NotNegative, Share};
+use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -56,6 +56,10 @@ pub struct RecordedFiles {
     /// the run ends with exit code 1.
     #[serde(default = "default_share", skip_serializing_if = "is_default_share")]
     pub max_without_pose: Share,
+    /// Largest time between two poses, to interpolate the pose of a detection between them. Then the frames of the
+    /// map are the times with detections. Default: a detection needs a pose at its time. Unit: seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_pose_gap: Option<Positive>,
 }
 
 fn odometry() -> PathBuf {
@@ -74,7 +78,11 @@ impl SequenceSource for RecordedFiles {
         let folder = folders.data_set(&self.folder, "source.folder")?;
         let lens = Rectification::new(&self.camera, self.distortion)?;
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
-        let by = TimeMatching { within: self.max_time_difference, without_pose: self.max_without_pose };
+        let by = TimeMatching {
+            within: self.max_time_difference,
+            without_pose: self.max_without_pose,
+            max_pose_gap: self.max_pose_gap,
+        };
         let (frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
         lens.apply(&mut detections)?;
         let mut truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
@@ -89,6 +97,7 @@ impl SequenceSource for RecordedFiles {
             up: self.up,
             accelerometer: vec![],
             ground_truth: truth,
+            pose_factors: vec![],
             unused,
         })
     }

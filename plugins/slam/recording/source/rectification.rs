@@ -3,7 +3,7 @@
 //! The outline of an ellipsoid is a conic only for a pinhole camera. All code after a source therefore uses
 //! the rectified image, and camera models appear only in this module.
 use super::{CameraChoice, SourceError};
-use crate::sequence::{Detection, Observation, UnusedDetection};
+use crate::sequence::{Detection, Observation, UnusedInput};
 use manifactor_geometry::{AnyCamera, RadialTangential};
 use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::Vector2;
@@ -77,7 +77,7 @@ impl Rectification {
                 None => {
                     let fault =
                         format!("{:?} has no place in the rectified image of the camera", seen.bounds());
-                    unused.push(UnusedDetection::Box { timestamp, place, fault });
+                    unused.push(UnusedInput::Box { timestamp, place, fault });
                     return false;
                 }
             }

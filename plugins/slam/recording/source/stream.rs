@@ -3,7 +3,7 @@ pub mod confirmed;
 
 use super::SourceError;
 use super::journal::LostFrameCounter;
-use crate::sequence::{Observation, Observations, Sequence, SequenceHeader};
+use crate::sequence::{Observation, Observations, Sequence, SequenceHeader, UnusedInput};
 use confirmed::OrderedFrames;
 use std::fmt;
 use std::ops::ControlFlow;
@@ -40,14 +40,20 @@ impl FrameStream {
         }
     }
 
-    /// Waits for the last frame and returns all frames.
+    /// Waits for the last frame and returns all frames. Images without a pose become unused input.
     ///
     /// # Errors
-    /// The first error.
+    /// The first other error.
     pub fn collect(self) -> Result<Sequence, SourceError> {
         let mut all = self.opening.into_sequence();
         for observation in OrderedFrames::new(self.observations) {
-            all.push(observation?);
+            match observation {
+                Err(SourceError::ImageWithoutPose { timestamp, boxes, why }) => {
+                    let fault = SourceError::ImageWithoutPose { timestamp, boxes, why }.to_string();
+                    all.unused.push(UnusedInput::Image { boxes, fault });
+                }
+                observation => all.push(observation?),
+            }
         }
         Ok(all)
     }

@@ -4,7 +4,7 @@ use super::rectification::{Distortion, Rectification};
 use super::{InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
-use manifactor_graph::checked::{NotNegative, Share};
+use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -48,6 +48,10 @@ pub struct TumRgbd {
     /// the run ends with exit code 1.
     #[serde(default = "default_share", skip_serializing_if = "is_default_share")]
     pub max_without_pose: Share,
+    /// Largest time between two poses, to interpolate the pose of a detection between them. Then the frames of the
+    /// map are the times with detections. Default: a detection needs a pose at its time. Unit: seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_pose_gap: Option<Positive>,
 }
 
 fn detections() -> PathBuf {
@@ -66,7 +70,11 @@ impl SequenceSource for TumRgbd {
             None => Rectification::of_pinhole(by_folder(&folder)?, self.distortion),
         };
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
-        let by = TimeMatching { within: self.max_time_difference, without_pose: self.max_without_pose };
+        let by = TimeMatching {
+            within: self.max_time_difference,
+            without_pose: self.max_without_pose,
+            max_pose_gap: self.max_pose_gap,
+        };
         let (frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
         lens.apply(&mut detections)?;
         let truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
@@ -83,6 +91,7 @@ impl SequenceSource for TumRgbd {
             up: None,
             accelerometer: readings.into_iter().map(reading).collect(),
             ground_truth: truth,
+            pose_factors: vec![],
             unused,
         })
     }

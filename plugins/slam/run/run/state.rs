@@ -24,7 +24,12 @@ impl StreamState {
 
     /// Adds a frame, and applies the estimated noise when its time has come.
     pub(super) fn add_frame(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
-        let mut report = self.mapper.add_frame(observation)?;
+        let taken = self.mapper.add_frame(observation);
+        if taken.is_err() {
+            // later poses refer to them
+            self.sequence.apply_pose_graph(observation.frame.timestamp, observation.pose_graph.clone());
+        }
+        let mut report = taken?;
         self.association.record_frame(&observation.detections, Some(&report));
         self.sequence.push(observation.clone());
         if let Some(noise) = &mut self.noise {

@@ -164,12 +164,15 @@ pub(super) fn replace_noise(entry: &mut FactorEntry, noise: Noise) {
     };
 }
 
-/// Returns the kind of measurement of a factor. Odometry is a factor between the poses of consecutive frames.
+/// Returns the kind of measurement of a factor. Odometry is a factor without a name between the poses of
+/// consecutive frames.
 pub(super) fn measurement_of(entry: &FactorEntry) -> MeasurementOf {
     let pose = TypeId::of::<Se3>();
     let are_poses = || entry.factor.erased().signature().variables.iter().all(|variable| *variable == pose);
     match &entry.keys[..] {
-        [from, to] if are_consecutive(from, to) && are_poses() => MeasurementOf::Motion,
+        [from, to] if entry.name.is_none() && are_consecutive(from, to) && are_poses() => {
+            MeasurementOf::Motion
+        }
         [_, object, ..] if box_of(entry).is_some() => MeasurementOf::Box { object: object.clone() },
         _ => MeasurementOf::Other,
     }

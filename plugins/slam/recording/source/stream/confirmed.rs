@@ -100,8 +100,8 @@ mod tests {
     use manifactor_geometry::Se3;
 
     fn observation(timestamp: f64) -> ReadFrame {
-        let frame = Frame { timestamp, world_from_camera: Se3::identity() };
-        Ok(Observation { frame, detections: vec![], accelerometer: vec![], unused: vec![] })
+        let frame = Frame::new(timestamp, Se3::identity());
+        Ok(Observation::new(frame))
     }
 
     fn confirmed(stamps: &[f64]) -> Vec<Option<f64>> {

@@ -1,0 +1,164 @@
+//! Factors on poses besides odometry, and corrected odometry of earlier frames.
+use super::Mapper;
+use super::frame::FrameReport;
+use super::object::ObjectState;
+use manifactor_formats::tum::StampedPose;
+use manifactor_graph::{FactorEntry, Graph, Key, Manifold, Values, Variable};
+use manifactor_mapping::mapping::{motion_step, pose_key, prior_entry};
+use manifactor_mapping::motion::MotionError;
+use manifactor_recording::pose_graph::{PoseFactor, PoseGraphChanges, correct_frames};
+use manifactor_recording::sequence::{Frame, ObjectId};
+use manifactor_smoother::{ChangeError, FactorId};
+use std::collections::HashMap;
+
+/// A step is replaced if its relative pose changes by more than this norm, in rad and m. Composition of poses
+/// rounds to about 1e-15.
+const MIN_CHANGE: f64 = 1e-9;
+
+impl Mapper {
+    /// Replaces the odometry of earlier frames by that of corrected poses. Poses and objects follow in this
+    /// update. If it fails, nothing changes.
+    pub(super) fn correct_poses(&mut self, corrected: &[StampedPose], report: &mut FrameReport) {
+        if corrected.is_empty() {
+            return;
+        }
+        let before = self.frames.clone();
+        let unknown = correct_frames(&mut self.frames, corrected);
+        report.refused.extend(unknown.iter().map(|error| format!("a corrected pose is left out: {error}")));
+        match self.replace_odometry(&before) {
+            Ok(outside) => {
+                if outside > 0 {
+                    report.refused.push(format!(
+                        "corrections of {outside} steps before the window count in the final map only"
+                    ));
+                }
+            }
+            Err(why) => {
+                self.frames = before;
+                report.refused.push(format!("the corrected poses: {why}"));
+                return;
+            }
+        }
+        match self.smoother.update() {
+            Ok(update) => report.updates.push(update),
+            Err(why) => {
+                self.frames = before;
+                report.refused.push(format!("the corrected poses: {why}"));
+                return;
+            }
+        }
+        self.is_corrected = true;
+        let is_tentative = |(id, object): (&ObjectId, &ObjectState)| {
+            matches!(object, ObjectState::Tentative(_)).then_some(*id)
+        };
+        for id in self.objects.iter().filter_map(is_tentative).collect::<Vec<_>>() {
+            self.objects.insert(id, ObjectState::Tentative(self.viewing_directions(id)));
+        }
+    }
+
+    /// Replaces the factors of steps whose odometry differs from `before`. Returns the number of steps that
+    /// are not in the smoother any more.
+    fn replace_odometry(&mut self, before: &[Frame]) -> Result<usize, String> {
+        let entries = self.changed_entries(before).map_err(|error| error.to_string())?;
+        let (graph, ids) = self.smoother.graph();
+        let name = |entry: &FactorEntry| (entry.keys.clone(), entry.factor.typetag_name());
+        let unnamed = graph.factors().iter().zip(ids).filter(|(entry, _)| entry.name.is_none());
+        let by_keys: HashMap<(Vec<Key>, &str), FactorId> =
+            unnamed.map(|(entry, id)| (name(entry), id)).collect();
+        let mut outside = 0;
+        for entry in entries {
+            match by_keys.get(&name(&entry)) {
+                Some(id) => self.smoother.replace(*id, entry).map_err(|error| error.to_string())?,
+                None => outside += 1,
+            }
+        }
+        Ok(outside)
+    }
+
+    /// Returns the factors of steps whose odometry differs from `before`, and the prior on the first pose if that
+    /// one differs.
+    fn changed_entries(&self, before: &[Frame]) -> Result<Vec<FactorEntry>, MotionError> {
+        let mut entries = vec![];
+        if let (Some(was), Some(first), Some(map)) =
+            (before.first(), self.frames.first(), self.up.map_frame())
+            && was.world_from_camera.local(&first.world_from_camera).norm() > MIN_CHANGE
+        {
+            entries
+                .push(prior_entry(map.map_from_odometry.compose(&first.world_from_camera), &self.settings));
+        }
+        let step_of = |pair: &[Frame]| pair[0].world_from_camera.between(&pair[1].world_from_camera);
+        for (i, (was, pair)) in before.windows(2).zip(self.frames.windows(2)).enumerate() {
+            if step_of(was).local(&step_of(pair)).norm() <= MIN_CHANGE {
+                continue;
+            }
+            let estimates = |key: &str| self.smoother.estimate(key);
+            let step = motion_step([i, i + 1], [&pair[0], &pair[1]], &self.settings, &estimates);
+            entries.extend(self.settings.motion.factors(&step)?);
+        }
+        Ok(entries)
+    }
+
+    /// Removes, adds and replaces factors on poses in an update of their own. Factors that do not fit are
+    /// refused; if the update fails, all are.
+    pub(super) fn apply_pose_factors(&mut self, changes: &PoseGraphChanges, report: &mut FrameReport) {
+        if changes.factors.is_empty() && changes.removed.is_empty() {
+            return;
+        }
+        let before = self.pose_factors.clone();
+        for id in &changes.removed {
+            let removed = match self.pose_factors.get(id) {
+                None => Err("there is no such factor".to_owned()),
+                Some(factor) => self.smoother.remove(&[*factor]).map_err(|error| left_window(&error)),
+            };
+            match removed {
+                Ok(()) => _ = self.pose_factors.remove(id),
+                Err(why) => report.refused.push(format!("`{id}` cannot be removed: {why}")),
+            }
+        }
+        for factor in &changes.factors {
+            if let Err(why) = self.push_pose_factor(factor) {
+                report.refused.push(format!("the factor `{}` is left out: {why}", factor.label()));
+            }
+        }
+        match self.smoother.update() {
+            Ok(update) => report.updates.push(update),
+            Err(why) => {
+                self.pose_factors = before;
+                report.refused.push(format!("the factors on poses: {why}"));
+            }
+        }
+    }
+
+    /// Adds a factor, or replaces the one with its id.
+    fn push_pose_factor(&mut self, factor: &PoseFactor) -> Result<(), String> {
+        let entry = factor.entry(&self.frames).map_err(|error| error.to_string())?;
+        let replaced = factor.id.as_ref().and_then(|id| self.pose_factors.get(id)).copied();
+        if replaced.is_some_and(|replaced| self.smoother.entry(replaced).is_none()) {
+            return Err("a pose of the factor it replaces has left the window; the change counts in the final map only".into());
+        }
+        let mut graph = Graph::new();
+        graph.push(entry);
+        let ids = self.smoother.push(&graph, &Values::new()).map_err(|error| left_window(&error))?;
+        if let Some(replaced) = replaced {
+            self.smoother.remove(&[replaced]).map_err(|error| left_window(&error))?;
+        }
+        if let (Some(name), Some(id)) = (&factor.id, ids.first()) {
+            self.pose_factors.insert(name.clone(), *id);
+        }
+        Ok(())
+    }
+}
+
+/// Returns the message of an error; of a pose or factor that has left the window, with its consequence.
+fn left_window(error: &ChangeError) -> String {
+    match error {
+        ChangeError::Marginalized { key } => {
+            format!("the pose {key} has left the window; the change counts in the final map only")
+        }
+        ChangeError::MarginalizedFactor { .. } => {
+            "a pose of it has left the window; the change counts in the final map only".to_owned()
+        }
+        ChangeError::Graph(errors) => errors.first().map_or_else(|| error.to_string(), ToString::to_string),
+        other => other.to_string(),
+    }
+}

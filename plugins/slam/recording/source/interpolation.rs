@@ -1,0 +1,242 @@
+//! Poses at the times of images, between the poses of a source.
+use super::SourceError;
+use crate::pose_graph::PoseGraphChanges;
+use crate::sequence::{Acceleration, Observation, UnusedInput};
+use manifactor_formats::tum::StampedPose;
+use manifactor_geometry::Se3;
+use manifactor_graph::Manifold;
+use std::collections::VecDeque;
+
+/// Reason why an image has no pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoPose {
+    /// The image was taken before the first pose.
+    Before,
+    /// The image was taken after the last pose.
+    After,
+    /// The poses around the image are too far apart. Unit: seconds.
+    Gap(f64),
+}
+
+/// Returns the pose at a time, interpolated on SE(3) between neighbours that are at most `max_gap` seconds
+/// apart. `poses` are sorted by time.
+///
+/// # Errors
+/// If there are no such neighbours.
+pub(super) fn pose_at(poses: &[StampedPose], timestamp: f64, max_gap: f64) -> Result<Se3, NoPose> {
+    let after = poses.partition_point(|pose| pose.timestamp < timestamp);
+    let to = poses.get(after).ok_or(NoPose::After)?;
+    if to.timestamp == timestamp {
+        return Ok(to.pose);
+    }
+    let from = after.checked_sub(1).and_then(|before| poses.get(before)).ok_or(NoPose::Before)?;
+    let gap = to.timestamp - from.timestamp;
+    if gap > max_gap {
+        return Err(NoPose::Gap(gap));
+    }
+    Ok(from.interpolate(to, timestamp))
+}
+
+/// A pose, an image, or both, as they arrive.
+#[derive(Debug, Clone)]
+pub(super) struct PoseOrImage {
+    /// The image; without a pose, its frame has the identity.
+    pub observation: Observation,
+    pub has_pose: bool,
+    pub is_image: bool,
+}
+
+/// An image may arrive this long after its time, in seconds.
+const MAX_DELAY_S: f64 = 10.0;
+
+/// Frames with interpolated poses. An image waits for the first pose after it. A pose without an image adds no
+/// frame.
+pub(super) struct InterpolatedFrames<I> {
+    read: I,
+    max_gap: f64,
+    /// Poses of the last seconds, sorted by time.
+    poses: Vec<StampedPose>,
+    /// Images that wait for a pose, sorted by time.
+    images: Vec<Observation>,
+    /// Data of poses without an image, for the next frame.
+    accelerometer: Vec<Acceleration>,
+    pose_graph: PoseGraphChanges,
+    unused: Vec<UnusedInput>,
+    ready: VecDeque<Result<Observation, SourceError>>,
+}
+
+impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I> {
+    /// Interpolates between poses that are at most `max_gap` seconds apart.
+    pub(super) fn new(read: I, max_gap: f64) -> Self {
+        Self {
+            read,
+            max_gap,
+            poses: vec![],
+            images: vec![],
+            accelerometer: vec![],
+            pose_graph: PoseGraphChanges::default(),
+            unused: vec![],
+            ready: VecDeque::new(),
+        }
+    }
+
+    fn add(&mut self, PoseOrImage { mut observation, has_pose, is_image }: PoseOrImage) {
+        let timestamp = observation.frame.timestamp;
+        let pose = observation.frame.world_from_camera;
+        if !(timestamp.is_finite() && pose.is_finite()) {
+            // the map rejects it with the reason
+            self.ready.push_back(Ok(observation));
+            return;
+        }
+        self.correct_poses(&observation.pose_graph.corrected);
+        if has_pose {
+            let place = self.poses.partition_point(|before| before.timestamp < timestamp);
+            match self.poses.get_mut(place).filter(|before| before.timestamp == timestamp) {
+                Some(before) => before.pose = pose,
+                None => self.poses.insert(place, StampedPose { timestamp, pose }),
+            }
+        }
+        let PoseGraphChanges { factors, removed, corrected } = &mut observation.pose_graph;
+        self.pose_graph.corrected.append(corrected);
+        if is_image {
+            let place = self.images.partition_point(|before| before.frame.timestamp <= timestamp);
+            self.images.insert(place, observation);
+        } else {
+            self.pose_graph.factors.append(factors);
+            self.pose_graph.removed.append(removed);
+            self.accelerometer.append(&mut observation.accelerometer);
+            self.unused.append(&mut observation.unused);
+        }
+        self.release(false);
+        let oldest = self.images.first().map_or(timestamp, |image| image.frame.timestamp.min(timestamp));
+        let old = self.poses.partition_point(|pose| pose.timestamp < oldest - MAX_DELAY_S);
+        self.poses.drain(..old);
+    }
+
+    /// Moves the poses so far to the corrected odometry frame of the next ones.
+    fn correct_poses(&mut self, corrected: &[StampedPose]) {
+        let correction = |corrected: &StampedPose| {
+            let before = pose_at(&self.poses, corrected.timestamp, self.max_gap).ok()?;
+            Some((corrected.timestamp, corrected.pose.compose(&before.inverse())))
+        };
+        let newest = corrected.iter().filter_map(correction).max_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, correction)) = newest {
+            for stamped in &mut self.poses {
+                stamped.pose = correction.compose(&stamped.pose);
+            }
+        }
+    }
+
+    /// Releases the images that a pose follows; at the end, all. The first one gets the corrections that have
+    /// arrived, the last one the factors.
+    fn release(&mut self, is_end: bool) {
+        let last = self.poses.last().map_or(f64::NEG_INFINITY, |pose| pose.timestamp);
+        let ready = self.images.partition_point(|image| is_end || image.frame.timestamp <= last);
+        let mut released = vec![];
+        for mut image in self.images.drain(..ready) {
+            let timestamp = image.frame.timestamp;
+            match pose_at(&self.poses, timestamp, self.max_gap) {
+                Ok(pose) => {
+                    image.frame.world_from_camera = pose;
+                    released.push(Ok(image));
+                }
+                Err(why) => {
+                    let boxes = image.detections.len();
+                    released.push(Err(SourceError::ImageWithoutPose { timestamp, boxes, why }));
+                }
+            }
+        }
+        if let Some(first) = released.iter_mut().flatten().next() {
+            first.accelerometer.splice(..0, self.accelerometer.drain(..));
+            first.pose_graph.corrected.append(&mut self.pose_graph.corrected);
+            first.unused.append(&mut self.unused);
+        }
+        if let Some(last) = released.iter_mut().flatten().next_back() {
+            last.pose_graph.factors.append(&mut self.pose_graph.factors);
+            last.pose_graph.removed.append(&mut self.pose_graph.removed);
+        }
+        self.ready.extend(released);
+    }
+}
+
+impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> Iterator for InterpolatedFrames<I> {
+    type Item = Result<Observation, SourceError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            if let Some(ready) = self.ready.pop_front() {
+                return Some(ready);
+            }
+            match self.read.next() {
+                Some(Ok(read)) => self.add(read),
+                Some(Err(error)) => return Some(Err(error)),
+                None if self.images.is_empty() => return None,
+                None => self.release(true),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sequence::Frame;
+    use manifactor_geometry::So3;
+    use nalgebra::{Vector3, Vector6};
+
+    fn stamped(timestamp: f64) -> StampedPose {
+        StampedPose { timestamp, pose: Se3::exp(&(Vector6::new(0.1, 0.2, -0.1, 1.0, 0.5, 0.0) * timestamp)) }
+    }
+
+    #[test]
+    fn a_constant_twist_is_interpolated_exactly() {
+        let poses = [1.0, 1.2, 1.4].map(stamped);
+        for timestamp in [1.0, 1.07, 1.2, 1.33, 1.4] {
+            let pose = pose_at(&poses, timestamp, 0.25).unwrap();
+            assert!(stamped(timestamp).pose.local(&pose).norm() < 1e-12, "{timestamp}");
+        }
+        assert_eq!(pose_at(&poses, 0.9, 0.25), Err(NoPose::Before));
+        assert_eq!(pose_at(&poses, 1.5, 0.25), Err(NoPose::After));
+        assert!(matches!(pose_at(&poses, 1.1, 0.1), Err(NoPose::Gap(gap)) if (gap - 0.2).abs() < 1e-12));
+    }
+
+    fn pose(timestamp: f64) -> Result<PoseOrImage, SourceError> {
+        let position = Se3::new(So3::identity(), Vector3::new(timestamp, 0.0, 0.0));
+        let mut observation = Observation::new(Frame::new(timestamp, position));
+        observation.accelerometer.push(Acceleration { timestamp, acceleration: Vector3::z() });
+        Ok(PoseOrImage { observation, has_pose: true, is_image: false })
+    }
+
+    fn image(timestamp: f64) -> Result<PoseOrImage, SourceError> {
+        let observation = Observation::new(Frame::new(timestamp, Se3::identity()));
+        Ok(PoseOrImage { observation, has_pose: false, is_image: true })
+    }
+
+    #[test]
+    fn images_get_poses_in_order_of_time_and_others_are_reported() {
+        let read = [
+            image(0.5),
+            pose(1.0),
+            image(1.25),
+            pose(2.0),
+            image(1.5),
+            image(1.75),
+            pose(5.0),
+            image(3.0),
+            image(6.0),
+        ];
+        let frames = InterpolatedFrames::new(read.into_iter(), 1.0);
+        let found: Vec<String> = frames
+            .map(|frame| match frame {
+                Ok(frame) => {
+                    let x = frame.frame.world_from_camera.translation.x;
+                    format!("{} {x} {}", frame.frame.timestamp, frame.accelerometer.len())
+                }
+                Err(SourceError::ImageWithoutPose { timestamp, why, .. }) => format!("{timestamp} {why:?}"),
+                Err(error) => error.to_string(),
+            })
+            .collect();
+        let expected = ["0.5 Before", "1.25 1.25 2", "1.5 1.5 0", "1.75 1.75 0", "3 Gap(3.0)", "6 After"];
+        assert_eq!(found, expected);
+    }
+}

@@ -1,0 +1,330 @@
+//! A frame as a line of JSON.
+use super::super::interpolation::PoseOrImage;
+use crate::measurement::Quantities;
+use crate::pose_graph::{PoseFactor, PoseGraphChanges};
+use crate::sequence::{Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, UnusedInput};
+use indexmap::IndexMap;
+use manifactor_formats::tum::StampedPose;
+use manifactor_geometry::Se3;
+use manifactor_graph::Noise;
+use manifactor_graph::checked::Share;
+use manifactor_quadric::BoundingBox;
+use nalgebra::Vector3;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::sync::Arc;
+
+/// A frame in the form of a line.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Line {
+    /// Timestamp. Unit: seconds.
+    timestamp: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pose: Option<Se3>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    boxes: Option<Vec<Value>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    accelerometer: Vec<AccelerometerReading>,
+    /// Noise of the step from the previous frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    odometry_noise: Option<Value>,
+    /// New factors on poses.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    factors: Vec<Value>,
+    /// Ids of factors to remove.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    removed: Vec<Value>,
+    /// Corrected poses of earlier frames.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    corrected: Vec<Value>,
+}
+
+/// A corrected pose of an earlier frame.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CorrectedPose {
+    timestamp: f64,
+    pose: Se3,
+}
+
+/// Rows of a pose residual: rotation, translation.
+const POSE_ROWS: usize = 6;
+
+/// A box in the form of a line; `quantities` collects all further fields.
+#[derive(Debug, Serialize, Deserialize)]
+struct LineBox {
+    #[serde(rename = "box")]
+    bounding_box: BoundingBox,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    class: Option<String>,
+    #[serde(default = "certain_score", skip_serializing_if = "is_certain")]
+    score: Share,
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    scores: IndexMap<String, f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    object: Option<ObjectId>,
+    #[serde(flatten)]
+    quantities: IndexMap<String, Value>,
+}
+
+/// Fields of a box besides its measurements.
+const FIELDS: [&str; 5] = ["box", "class", "score", "scores", "object"];
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AccelerometerReading {
+    timestamp: f64,
+    acceleration: Vector3<f64>,
+}
+
+fn certain_score() -> Share {
+    Share::literal(1.0)
+}
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_certain(score: &Share) -> bool {
+    **score >= 1.0
+}
+
+/// Returns a frame as a line for this source, without the line end.
+pub fn format_line(observation: &Observation) -> String {
+    let of_box = |detection: &Detection| {
+        let scores: IndexMap<String, f64> = detection.scores.iter().map(|(c, s)| (c.to_owned(), s)).collect();
+        let first = scores.first().filter(|_| scores.len() == 1);
+        let single = first.and_then(|(class, score)| Some((class.clone(), Share::new(*score).ok()?)));
+        LineBox {
+            bounding_box: detection.bounding_box,
+            scores: if single.is_some() { IndexMap::new() } else { scores },
+            score: single.as_ref().map_or_else(certain_score, |(_, score)| *score),
+            class: single.map(|(class, _)| class),
+            object: detection.object,
+            quantities: detection.quantities.to_fields().collect(),
+        }
+    };
+    let of_reading =
+        |r: &Acceleration| AccelerometerReading { timestamp: r.timestamp, acceleration: r.acceleration };
+    let of_pose = |p: &StampedPose| CorrectedPose { timestamp: p.timestamp, pose: p.pose };
+    let line = Line {
+        timestamp: observation.frame.timestamp,
+        pose: Some(observation.frame.world_from_camera),
+        boxes: Some(to_values(observation.detections.iter().map(of_box))),
+        accelerometer: observation.accelerometer.iter().map(of_reading).collect(),
+        odometry_noise: observation
+            .frame
+            .odometry_noise
+            .as_deref()
+            .and_then(|n| serde_json::to_value(n).ok()),
+        factors: to_values(&observation.pose_graph.factors),
+        removed: to_values(&observation.pose_graph.removed),
+        corrected: to_values(observation.pose_graph.corrected.iter().map(of_pose)),
+    };
+    serde_json::to_string(&line).unwrap_or_default()
+}
+
+fn to_values(items: impl IntoIterator<Item = impl Serialize>) -> Vec<Value> {
+    items.into_iter().filter_map(|item| serde_json::to_value(item).ok()).collect()
+}
+
+/// Reads the items of a list. Items that cannot be read are left out and reported.
+fn read_items<T: DeserializeOwned>(
+    items: Vec<Value>,
+    field: &str,
+    timestamp: f64,
+    unused: &mut Vec<UnusedInput>,
+) -> Vec<T> {
+    let read = |(place, item): (usize, Value)| match serde_json::from_value(item) {
+        Ok(item) => Some(item),
+        Err(error) => {
+            let field = format!("{field} {}", place + 1);
+            unused.push(UnusedInput::PoseGraph { timestamp, field, fault: error.to_string() });
+            None
+        }
+    };
+    items.into_iter().enumerate().filter_map(read).collect()
+}
+
+/// Reads the noise of a step.
+fn read_noise(noise: Value) -> Result<Arc<Noise>, String> {
+    let noise: Noise = serde_json::from_value(noise).map_err(|error| error.to_string())?;
+    noise.whitener(POSE_ROWS).map_err(|error| error.to_string())?;
+    Ok(Arc::new(noise))
+}
+
+/// Reads a frame from such a line.
+///
+/// # Errors
+/// If the line is not a frame, or has no pose.
+pub fn parse(line: &[u8]) -> Result<Observation, String> {
+    let PoseOrImage { observation, has_pose, .. } = parse_line(line)?;
+    has_pose.then_some(observation).ok_or_else(|| "missing field `pose`".into())
+}
+
+/// Reads a pose, an image or both from a line.
+pub(super) fn parse_line(line: &[u8]) -> Result<PoseOrImage, String> {
+    let read = serde_json::from_slice(line).or_else(|error| match without_infinities(line) {
+        Some(text) => serde_json::from_str(&text),
+        None => Err(error),
+    });
+    let Line { timestamp, pose, boxes, accelerometer, odometry_noise, factors, removed, corrected } =
+        read.map_err(|error: serde_json::Error| error.to_string())?;
+    let (mut detections, mut unused) = (vec![], vec![]);
+    let (has_pose, is_image) = (pose.is_some(), boxes.is_some());
+    for (place, value) in boxes.unwrap_or_default().into_iter().enumerate() {
+        match LineBox::read(value) {
+            Ok(seen) => detections.push(seen),
+            Err(fault) => unused.push(UnusedInput::Box { timestamp, place: place + 1, fault }),
+        }
+    }
+    let mut frame = Frame::new(timestamp, pose.unwrap_or_else(Se3::identity));
+    match odometry_noise.map(read_noise).transpose() {
+        Ok(noise) => frame.odometry_noise = noise,
+        Err(fault) => {
+            unused.push(UnusedInput::PoseGraph { timestamp, field: "odometry_noise".into(), fault });
+        }
+    }
+    let corrected = read_items(corrected, "corrected", timestamp, &mut unused).into_iter();
+    let pose_graph = PoseGraphChanges {
+        factors: read_items::<PoseFactor>(factors, "factors", timestamp, &mut unused),
+        removed: read_items(removed, "removed", timestamp, &mut unused),
+        corrected: corrected
+            .map(|CorrectedPose { timestamp, pose }| StampedPose { timestamp, pose })
+            .collect(),
+    };
+    let of_reading =
+        |r: AccelerometerReading| Acceleration { timestamp: r.timestamp, acceleration: r.acceleration };
+    let observation = Observation {
+        frame,
+        detections,
+        accelerometer: accelerometer.into_iter().map(of_reading).collect(),
+        pose_graph,
+        unused,
+    };
+    Ok(PoseOrImage { observation, has_pose, is_image })
+}
+
+/// Returns the line with `null` in place of each non-finite number; `None` if all numbers are finite. JSON
+/// has no such numbers, but programs in several languages write them. A field that needs a number rejects
+/// `null`; in a box this rejects only the box.
+fn without_infinities(line: &[u8]) -> Option<String> {
+    let text = std::str::from_utf8(line).ok()?;
+    let (mut out, mut word, mut found) = (String::with_capacity(text.len()), String::new(), false);
+    let (mut is_text, mut is_escaped) = (false, false);
+    for c in text.chars().chain(['\n']) {
+        if !is_text && (c.is_ascii_alphanumeric() || ['+', '-', '.'].contains(&c)) {
+            word.push(c);
+            continue;
+        }
+        if !word.is_empty() {
+            let is_infinite = word.parse::<f64>().is_ok_and(|number| !number.is_finite());
+            found |= is_infinite;
+            out += if is_infinite { "null" } else { &word };
+            word.clear();
+        }
+        match c {
+            '"' if !is_escaped => is_text = !is_text,
+            _ => {}
+        }
+        is_escaped = is_text && c == '\\' && !is_escaped;
+        out.push(c);
+    }
+    found.then_some(out)
+}
+
+impl LineBox {
+    fn read(value: Value) -> Result<Detection, String> {
+        let seen: Self = serde_json::from_value(value).map_err(|error| error.to_string())?;
+        if let Some((class, score)) = seen.scores.iter().find(|(_, score)| !(0.0..=1.0).contains(*score)) {
+            return Err(format!("the score of `{class}` must be a number from 0 to 1, got {score}"));
+        }
+        match &seen.class {
+            Some(class) if !seen.scores.is_empty() => {
+                Err(format!("a box has `class` and `score`, or `scores`, and not both: `{class}`"))
+            }
+            _ => seen.into_detection(),
+        }
+    }
+
+    fn into_detection(self) -> Result<Detection, String> {
+        let single = self.class.map(|class| (class, self.score.get()));
+        let scores: ClassScores = self.scores.into_iter().chain(single).collect();
+        let quantities = Quantities::read(self.quantities, &FIELDS)?;
+        Ok(Detection { frame: 0, object: self.object, scores, bounding_box: self.bounding_box, quantities })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scores_are_from_0_to_1_and_given_once() {
+        let line = |seen: &str| {
+            format!(
+                r#"{{"timestamp": 1.0, "pose": {{"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}, "boxes": [{seen}]}}"#
+            )
+        };
+        let wrong = [
+            (r#"{"box": [1, 1, 5, 5], "class": "cup", "score": 1.7}"#, "0"),
+            (
+                r#"{"box": [1, 1, 5, 5], "scores": {"cup": 1.7}}"#,
+                "the score of `cup` must be a number from 0 to 1",
+            ),
+            (r#"{"box": [1, 1, 5, 5], "class": "cup", "scores": {"cup": 0.7}}"#, "and not both: `cup`"),
+            (r#"{"box": [1, 1, 5, NaN], "class": "Infinity \" NaN"}"#, "null"),
+            (r#"{"box": [1, -Infinity, 5, 5], "class": "cup"}"#, "null"),
+            (r#"{"box": [1, 1, 1e999, 5], "class": "cup"}"#, "null"),
+        ];
+        for (seen, words) in wrong {
+            let good = r#"{"box": [1, 1, 5, 5], "class": "cup"}"#;
+            let read = parse(line(&format!("{seen}, {good}")).as_bytes()).unwrap();
+            let UnusedInput::Box { place, fault, .. } = &read.unused[0] else { panic!() };
+            assert!(*place == 1 && fault.contains(words) && read.detections.len() == 1, "{fault}");
+        }
+        let two =
+            parse(line(r#"{"box": [1, 1, 5, 5], "scores": {"cup": 0.7, "bowl": 0.2}}"#).as_bytes()).unwrap();
+        assert_eq!(two.detections[0].scores.iter().count(), 2);
+    }
+
+    const CLOSURE: &str = r#"{"id": "loop 1", "keys": [1.0, 7.5], "factor": {"type": "between_se3", "relative": {"translation": [1, 0, 0], "rotation": [0, 0, 0, 1]}}, "noise": {"sigma": 0.01}}"#;
+
+    fn line_with(fields: &str) -> Observation {
+        let pose = r#""timestamp": 9.0, "pose": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}"#;
+        parse(format!("{{{pose}, {fields}}}").as_bytes()).unwrap()
+    }
+
+    #[test]
+    fn changes_of_the_pose_graph_are_read_back_as_written() {
+        let sigmas = r#""odometry_noise": {"sigmas": [0.01, 0.01, 0.01, 0.02, 0.02, 0.02]}"#;
+        let corrected = r#""corrected": [{"timestamp": 7.5, "pose": {"translation": [0, 1, 0], "rotation": [0, 0, 0, 1]}}]"#;
+        let read =
+            line_with(&format!(r#"{sigmas}, "factors": [{CLOSURE}], "removed": ["loop 0"], {corrected}"#));
+        assert!(read.unused.is_empty() && read.frame.odometry_noise.is_some(), "{:?}", read.unused);
+        let PoseGraphChanges { factors, removed, corrected } = &read.pose_graph;
+        assert_eq!((factors[0].id.as_deref(), removed[0].as_str()), (Some("loop 1"), "loop 0"));
+        assert_eq!((corrected[0].timestamp, corrected[0].pose.translation.y), (7.5, 1.0));
+        assert_eq!(parse(format_line(&read).as_bytes()).unwrap(), read);
+    }
+
+    #[test]
+    fn a_faulty_change_of_the_pose_graph_is_left_out_alone() {
+        let faulty = [
+            (CLOSURE.replace("0.01", "-1"), "a standard deviation must be a finite number above zero"),
+            (CLOSURE.replace("between_se3", "betwen_se3"), "between_se3"),
+            (CLOSURE.replace("7.5", "null"), "the timestamp of a frame"),
+            (CLOSURE.replace("\"id\"", "\"ids\""), "ids"),
+            (CLOSURE.replace(r#", "noise": {"sigma": 0.01}"#, ""), "noise"),
+            ("7".to_owned(), "PoseFactor"),
+        ];
+        for (factor, words) in faulty {
+            let read = line_with(&format!(r#""factors": [{factor}, {CLOSURE}]"#));
+            let UnusedInput::PoseGraph { field, fault, .. } = &read.unused[0] else { panic!() };
+            assert!(field == "factors 1" && fault.contains(words), "{field}: {fault}");
+            assert_eq!((read.pose_graph.factors.len(), read.unused.len()), (1, 1));
+        }
+        let skewed =
+            r#""odometry_noise": {"sigmas": [1, 1]}, "removed": [3], "corrected": [{"timestamp": 1}]"#;
+        let read = line_with(skewed);
+        assert!(read.unused.len() == 3 && read.pose_graph.is_empty() && read.frame.odometry_noise.is_none());
+    }
+}
