@@ -36,11 +36,21 @@ pub enum ChangeError {
     },
     /// A variable that has to keep its linearization point because it is part of a linear prior.
     #[error(
-        "`{key}` cannot be held or freed: it is part of a linear prior, and keeps its linearization point"
+        "`{key}` cannot be held, freed or moved: it is part of a linear prior, and keeps its linearization point"
     )]
     FixedLinearization {
         /// Its key.
         key: Key,
+    },
+    /// A new estimate of a different type.
+    #[error("`{key}` is of type `{expected}`, and the new estimate of type `{found}`")]
+    Type {
+        /// The variable.
+        key: Key,
+        /// Its type.
+        expected: &'static str,
+        /// Type of the estimate.
+        found: &'static str,
     },
     /// A factor that never existed here or was removed.
     #[error("there is no factor {factor}: it was removed, or belongs to another smoother")]

@@ -9,7 +9,9 @@ use crate::error::ChangeError;
 use crate::factor_id::FactorId;
 use crate::model::{NewNumber, Reserved};
 use indexmap::IndexMap;
-use manifactor_graph::{FactorEntry, Fixed, Graph, GraphError, Key, Resolved, Values, Variable};
+use manifactor_graph::{
+    FactorEntry, Fixed, Graph, GraphError, Key, Resolved, Values, Variable, manifold_name,
+};
 use std::any::TypeId;
 
 /// A variable that the next update adds.
@@ -28,6 +30,8 @@ pub(super) struct Pending {
     reserved: Reserved,
     /// The time that was set since the last update.
     pub(super) time: Option<f64>,
+    /// New estimates of variables.
+    pub(super) moved: IndexMap<Key, Box<dyn Variable>>,
     /// Variables to marginalize.
     pub(super) leaving: Vec<Key>,
     pub(super) changes: Vec<Change>,
@@ -38,7 +42,11 @@ pub(super) struct Pending {
 
 impl Pending {
     pub(super) fn is_empty(&self) -> bool {
-        self.variables.is_empty() && self.changes.is_empty() && self.leaving.is_empty() && self.time.is_none()
+        self.variables.is_empty()
+            && self.changes.is_empty()
+            && self.moved.is_empty()
+            && self.leaving.is_empty()
+            && self.time.is_none()
     }
 }
 
@@ -210,6 +218,34 @@ impl Smoother {
                 let changes = variable.map(|variable| Change::SetHeld { variable, held });
                 self.pending.changes.extend(changes);
             }
+        }
+        Ok(())
+    }
+
+    /// Moves the estimate of a variable, so that its factors are linearized there. The next
+    /// [`update`](Self::update) starts from it: use it if a change of the factors moves variables far, and the
+    /// caller knows where to.
+    ///
+    /// # Errors
+    /// If there is no such variable, if it has a different type or is not finite, or if a linear prior keeps its
+    /// linearization point.
+    pub fn move_to(&mut self, key: &str, value: &dyn Variable) -> Result<(), ChangeError> {
+        let key = Key::from(key);
+        let (_, expected) = self.find(key.as_str()).ok_or_else(|| self.no_variable(&key))?;
+        if value.erased().type_id() != expected {
+            let (expected, found) = (manifold_name(expected), value.typetag_name());
+            return Err(ChangeError::Type { key, expected, found });
+        }
+        if !value.erased().is_finite() {
+            return Err(ChangeError::Graph(vec![GraphError::NotFinite { key }]));
+        }
+        if self.model.variable(key.as_str()).is_some_and(|v| self.model.record(v).prior_count > 0) {
+            return Err(ChangeError::FixedLinearization { key });
+        }
+        let value = value.erased().clone_box();
+        match self.pending.variables.get_mut(&key) {
+            Some(new) => new.value = value,
+            None => _ = self.pending.moved.insert(key, value),
         }
         Ok(())
     }

@@ -17,6 +17,8 @@ pub(super) struct Undo {
     pub(super) variables: Vec<NewNumber>,
     pub(super) changes: Vec<Change>,
     pub(super) moves: Moves,
+    /// Steps of moved variables before the update.
+    pub(super) steps: Vec<(u32, Vec<f64>)>,
 }
 
 /// Largest number of touched variables that are eliminated last. If there are more, only the `NEWEST_LAST`
@@ -76,6 +78,15 @@ impl Smoother {
         }
         self.undetermined.doubt_inactive(&self.model, &mut touched);
         let moves = Moves::of(&mut self.model, &self.factorization, &mut touched);
+        for (key, value) in &pending.moved {
+            let Some(variable) = self.model.variable(key.as_str()) else { continue };
+            let step = self.model.point(variable).and_then(|point| point.erased().local(&**value));
+            if let Some(step) = step {
+                undo.steps.push((variable, self.steps.of(&self.model, variable).to_vec()));
+                self.steps.set(&self.model, variable, &step);
+                touched.held.push(variable);
+            }
+        }
         let is_turn = self.queue.postponed() > 0 || self.schedule.is_turn();
         if let Err(overflow) = self.run_pass(&touched, &moves, is_turn, &mut report) {
             let key = self.key(overflow.0);
@@ -132,6 +143,9 @@ impl Smoother {
     /// Undoes changes, the last one first.
     pub(super) fn undo(&mut self, undo: Undo) {
         undo.moves.undo(&mut self.model);
+        for (variable, step) in undo.steps {
+            self.steps.set(&self.model, variable, &step);
+        }
         let mut touched = Touched::default();
         for change in undo.changes.into_iter().rev() {
             change.apply(&mut self.model, &mut touched);

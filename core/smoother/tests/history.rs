@@ -23,6 +23,7 @@ pub(crate) enum Change {
     SetWeight(usize, f64),
     Replace(usize),
     Fix(usize, u32),
+    Move(usize),
     Update,
 }
 
@@ -37,7 +38,8 @@ pub(crate) fn change() -> impl Strategy<Value = Change> {
         2 => n.clone().prop_map(Change::Remove),
         1 => (n.clone(), prop_oneof![Just(0.0), 0.1..3.0]).prop_map(|(f, w)| Change::SetWeight(f, w)),
         1 => n.clone().prop_map(Change::Replace),
-        1 => (n, 0..8u32).prop_map(|(v, bits)| Change::Fix(v, bits)),
+        1 => (n.clone(), 0..8u32).prop_map(|(v, bits)| Change::Fix(v, bits)),
+        1 => n.prop_map(Change::Move),
         4 => Just(Change::Update),
     ]
 }
@@ -187,6 +189,14 @@ impl History {
                 let names: Vec<String> = named.map(|(_, name)| (*name).to_owned()).collect();
                 let key = self.keys[v % n].clone();
                 allowed(self.smoother.fix(&key, &Fixed::Directions(names)));
+            }
+            Change::Move(v) if n > 0 => {
+                let x = self.number();
+                let moved = match self.is_plane(v % n) {
+                    true => self.smoother.move_to(self.keys[v % n].as_str(), &Plane { x, y: 2.0 * x }),
+                    false => self.smoother.move_to(self.keys[v % n].as_str(), &Space { at: [x, 1.0, x] }),
+                };
+                allowed(moved);
             }
             Change::Update => return Some(self.smoother.update().unwrap()),
             _ => {}

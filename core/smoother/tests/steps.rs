@@ -1,9 +1,11 @@
 //! Steps that are too long, and steps out of a domain.
+use crate::history::bits;
 use crate::toy::{At, Logarithm, Plane, Valley};
+use crate::world::Space;
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Fixed, Graph, Noise, Values};
-use manifactor_smoother::{Smoother, SmootherSettings};
+use manifactor_smoother::{ChangeError, Smoother, SmootherSettings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 use std::num::NonZeroUsize;
 
@@ -29,6 +31,28 @@ fn a_step_that_raises_the_cost_is_damped() {
     assert_eq!(fresh.update().unwrap().damped, 0);
     // except for slightly different linearization points
     assert!((&one - fresh.covariance(&["p"]).unwrap()).amax() < 0.05 * one.amax());
+}
+
+#[test]
+fn an_update_starts_at_the_estimate_that_a_caller_sets() {
+    let mut smoother = Smoother::new(SmootherSettings::default());
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("p", Plane { x: -1.2, y: 1.0 });
+    graph.add(["p"], Valley {});
+    smoother.push(&graph, &values).unwrap();
+    smoother.update().unwrap();
+    assert!(smoother.cost() > 1.0);
+    smoother.move_to("p", &Plane { x: 1.01, y: 1.02 }).unwrap();
+    assert_eq!(smoother.update().unwrap().relinearized, 1);
+    assert!(smoother.cost() < 1e-3, "{}", smoother.cost());
+    // errors change nothing
+    let before = bits(&smoother);
+    let none = smoother.move_to("q", &Plane { x: 0.0, y: 0.0 }).unwrap_err();
+    let other = smoother.move_to("p", &Space { at: [0.0; 3] }).unwrap_err();
+    let infinite = smoother.move_to("p", &Plane { x: f64::INFINITY, y: 0.0 }).unwrap_err();
+    assert!(matches!(none, ChangeError::NoVariable { .. }) && matches!(other, ChangeError::Type { .. }));
+    assert!(infinite.to_string().contains("finite"), "{infinite}");
+    assert_eq!(bits(&smoother), before);
 }
 
 #[test]

@@ -4,16 +4,24 @@ use super::frame::FrameReport;
 use super::object::ObjectState;
 use manifactor_formats::tum::StampedPose;
 use manifactor_graph::{FactorEntry, Graph, Key, Manifold, Values, Variable};
-use manifactor_mapping::mapping::{motion_step, pose_key, prior_entry};
+use manifactor_mapping::mapping::{motion_step, object_key, pose_key, prior_entry};
 use manifactor_mapping::motion::MotionError;
+use manifactor_quadric::DualQuadric;
 use manifactor_recording::pose_graph::{PoseFactor, PoseGraphChanges, correct_frames};
 use manifactor_recording::sequence::{Frame, ObjectId};
-use manifactor_smoother::{ChangeError, FactorId};
+use manifactor_smoother::{ChangeError, FactorId, UpdateError};
 use std::collections::HashMap;
 
 /// A step is replaced if its relative pose changes by more than this norm, in rad and m. Composition of poses
 /// rounds to about 1e-15.
 const MIN_CHANGE: f64 = 1e-9;
+
+/// Share of relinearized variables above which a change of the pose graph is followed by further updates. The
+/// positions of a satellite receiver at each frame stay below.
+const SETTLING_SHARE: f64 = 0.125;
+/// Largest number of these updates, and the relative decrease of the cost below which they end.
+const MAX_SETTLING_UPDATES: usize = 5;
+const MIN_COST_DECREASE: f64 = 1e-3;
 
 impl Mapper {
     /// Replaces the odometry of earlier frames by that of corrected poses. Poses and objects follow in this
@@ -25,6 +33,10 @@ impl Mapper {
         let before = self.frames.clone();
         let unknown = correct_frames(&mut self.frames, corrected);
         report.refused.extend(unknown.iter().map(|error| format!("a corrected pose is left out: {error}")));
+        if unknown.len() == corrected.len() {
+            return;
+        }
+        self.move_estimates(&before);
         match self.replace_odometry(&before) {
             Ok(outside) => {
                 if outside > 0 {
@@ -39,13 +51,10 @@ impl Mapper {
                 return;
             }
         }
-        match self.smoother.update() {
-            Ok(update) => report.updates.push(update),
-            Err(why) => {
-                self.frames = before;
-                report.refused.push(format!("the corrected poses: {why}"));
-                return;
-            }
+        if let Err(why) = self.update_and_settle(report) {
+            self.frames = before;
+            report.refused.push(format!("the corrected poses: {why}"));
+            return;
         }
         self.is_corrected = true;
         let is_tentative = |(id, object): (&ObjectId, &ObjectState)| {
@@ -53,6 +62,33 @@ impl Mapper {
         };
         for id in self.objects.iter().filter_map(is_tentative).collect::<Vec<_>>() {
             self.objects.insert(id, ObjectState::Tentative(self.viewing_directions(id)));
+        }
+    }
+
+    /// Moves poses and objects by the corrections of their frames, so that the update starts near its result. An
+    /// object moves with the middle one of its views. Estimates that a linear prior keeps in place stay.
+    fn move_estimates(&mut self, before: &[Frame]) {
+        let Some(map) = self.up.map_frame().map(|frame| frame.map_from_odometry) else { return };
+        let correction = |i: usize| {
+            let (was, now) = (before.get(i)?.world_from_camera, self.frames.get(i)?.world_from_camera);
+            Some(map.compose(&now.compose(&was.inverse())).compose(&map.inverse()))
+        };
+        let mut moved: Vec<(Key, Box<dyn Variable>)> = vec![];
+        for i in 0..before.len() {
+            if let (Some(correction), Some(pose)) = (correction(i), self.pose(i)) {
+                moved.push((pose_key(i), Box::new(correction.compose(&pose))));
+            }
+        }
+        for (measured, quadric) in self.objects() {
+            let middle = measured.views.get(measured.views.len() / 2);
+            if let Some(correction) = middle.and_then(|view| correction(view.frame)) {
+                let pose = correction.compose(&quadric.pose);
+                moved.push((object_key(measured.id), Box::new(DualQuadric { pose, ..quadric })));
+            }
+        }
+        for (key, value) in moved {
+            // an error means that a linear prior keeps the linearization point
+            _ = self.smoother.move_to(key.as_str(), &*value);
         }
     }
 
@@ -105,28 +141,56 @@ impl Mapper {
             return;
         }
         let before = self.pose_factors.clone();
+        let mut changed = 0;
         for id in &changes.removed {
             let removed = match self.pose_factors.get(id) {
                 None => Err("there is no such factor".to_owned()),
                 Some(factor) => self.smoother.remove(&[*factor]).map_err(|error| left_window(&error)),
             };
             match removed {
-                Ok(()) => _ = self.pose_factors.remove(id),
+                Ok(()) => {
+                    self.pose_factors.remove(id);
+                    changed += 1;
+                }
                 Err(why) => report.refused.push(format!("`{id}` cannot be removed: {why}")),
             }
         }
         for factor in &changes.factors {
-            if let Err(why) = self.push_pose_factor(factor) {
-                report.refused.push(format!("the factor `{}` is left out: {why}", factor.label()));
+            match self.push_pose_factor(factor) {
+                Ok(()) => changed += 1,
+                Err(why) => {
+                    report.refused.push(format!("the factor `{}` is left out: {why}", factor.label()));
+                }
             }
         }
-        match self.smoother.update() {
-            Ok(update) => report.updates.push(update),
-            Err(why) => {
-                self.pose_factors = before;
-                report.refused.push(format!("the factors on poses: {why}"));
+        if changed == 0 {
+            return;
+        }
+        if let Err(why) = self.update_and_settle(report) {
+            self.pose_factors = before;
+            report.refused.push(format!("the factors on poses: {why}"));
+        }
+    }
+
+    /// Updates the smoother. If a large part of the map moves, more updates bring it to the minimum.
+    fn update_and_settle(&mut self, report: &mut FrameReport) -> Result<(), UpdateError> {
+        let update = self.smoother.update()?;
+        let is_large = update.relinearized as f64 > SETTLING_SHARE * self.smoother.variables() as f64;
+        report.updates.push(update);
+        if is_large {
+            // the second update without a change relinearizes all variables that still move
+            report.updates.push(self.smoother.update()?);
+            let mut cost = f64::INFINITY;
+            for _ in 0..MAX_SETTLING_UPDATES {
+                let now = self.smoother.cost();
+                if now > (1.0 - MIN_COST_DECREASE) * cost {
+                    break;
+                }
+                cost = now;
+                report.updates.push(self.smoother.update()?);
             }
         }
+        Ok(())
     }
 
     /// Adds a factor, or replaces the one with its id.
