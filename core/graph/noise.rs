@@ -6,7 +6,7 @@ mod whiteners;
 
 use nalgebra::{Cholesky, DMatrix};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 pub(crate) use whiteners::Whiteners;
 
@@ -39,20 +39,25 @@ enum NoiseModel {
 #[schemars(rename = "Noise")]
 struct NoiseDocument {
     /// Standard deviation of every row, in the units of the row.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
     sigma: Option<f64>,
     /// Standard deviation of each row.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
     sigmas: Option<Vec<f64>>,
     /// Covariance matrix, by rows: symmetric and positive definite.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
     covariance: Option<Vec<Vec<f64>>>,
     /// Information matrix, by rows: symmetric and positive definite.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
     information: Option<Vec<Vec<f64>>>,
     /// Mask of the measured rows of the residual. Default: all.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "present", skip_serializing_if = "Option::is_none")]
     observed: Option<Vec<bool>>,
+}
+
+/// Reads a field that is given. `null` is an error: programs write it in place of NaN, and it must not mean unit noise.
+fn present<'de, T: Deserialize<'de>, D: Deserializer<'de>>(value: D) -> Result<Option<T>, D::Error> {
+    T::deserialize(value).map(Some)
 }
 
 /// An error in a noise model.

@@ -4,5 +4,6 @@ mod help;
 mod kinds;
 mod log;
 mod mistakes;
+mod slam_systems;
 mod terminal;
 mod tutorial;

@@ -222,6 +222,12 @@ impl StreamWatcher for Frames<'_> {
     }
 
     fn on_end(&mut self, mapper: &mut Mapper) {
+        if self.command.map {
+            let changed = self.objects.take(mapper);
+            if !changed.is_empty() {
+                output::print_json_line(&json!({ "map": changed }));
+            }
+        }
         if let Some(view) = self.view {
             view.refresh(mapper);
         }

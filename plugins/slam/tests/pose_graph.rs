@@ -7,9 +7,10 @@ use manifactor_slam::estimate::Estimate;
 use manifactor_slam::online::{FrameReport, Mapper};
 use manifactor_slam::pose_graph::{PoseFactor, PoseFactorKey, PoseGraphChanges};
 use manifactor_slam::run::Run;
+use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::{ObjectId, Observation, Sequence};
 use manifactor_slam::settings::RunSettings;
-use manifactor_slam::source::format_line;
+use manifactor_slam::source::{format_line, parse};
 use manifactor_solve::Silent;
 use nalgebra::{Vector3, Vector6};
 use std::collections::BTreeMap;
@@ -263,8 +264,54 @@ fn a_step_has_the_noise_of_its_frame() {
     assert_eq!(of_step("x2").noise, settings.odometry.noise);
 }
 
+/// A document of TABLE with frames from a file, and more fields of its source.
+fn document_of_lines(folder: &Path, lines: &[String], more: &str) -> RunDocument {
+    std::fs::write(folder.join("frames.jsonl"), lines.join("\n")).unwrap();
+    let camera = "{ fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
+    let source = format!(
+        r#"source = {{ type = "json_lines", camera = {camera}, file = "frames.jsonl", up = [0, 0, 1]{more} }}"#
+    );
+    let lines = TABLE.lines().map(|line| if line.starts_with("source") { &source } else { line });
+    let mut run = run_of(&lines.collect::<Vec<_>>().join("\n"), &[]);
+    run.folder = folder.into();
+    run
+}
+
+#[test]
+fn images_between_poses_give_the_map_of_images_with_poses() {
+    let (_, sequence) = scene(&TABLE.replace("frames = 80", "frames = 240, interval = 0.03"));
+    let is_image = |i: usize| i % 3 == 1;
+    let frames: Vec<(usize, Observation)> = sequence.observations().enumerate().collect();
+    let exact: Vec<String> =
+        frames.iter().filter(|(i, _)| is_image(*i)).map(|(_, frame)| format_line(frame)).collect();
+    let split = |(i, frame): &(usize, Observation)| {
+        let mut line: serde_json::Value = serde_json::from_str(&format_line(frame)).unwrap();
+        let field = if is_image(*i) { "pose" } else { "boxes" };
+        line.as_object_mut().unwrap().remove(field);
+        line.to_string()
+    };
+    let mut apart: Vec<String> = frames.iter().map(split).collect();
+    // no pose follows this image
+    apart.push(r#"{"timestamp": 99.0, "boxes": [{"box": [1, 1, 9, 9]}]}"#.into());
+    let map = |lines: &[String], more: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let run = document_of_lines(folder.path(), lines, more);
+        let (estimate, report) = Run::new(&run, None).run_variant(&run.variants[0], &mut Silent).unwrap();
+        let centres: BTreeMap<ObjectId, Vector3<f64>> =
+            estimate.landmarks().iter().map(|l| (l.object.id, l.quadric.centroid())).collect();
+        (estimate.sequence.frames.len(), centres, report.warnings)
+    };
+    let (count, expected, _) = map(&exact, "");
+    let (found, centres, warnings) = map(&apart, ", max_pose_gap = 0.1");
+    assert_eq!((count, found), (80, 80));
+    let distance = largest_distance(&centres, &expected);
+    assert!(distance < 0.01, "{distance} m");
+    let text = warnings.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+    assert!(text.contains("images without a pose are left out: 1, with 1 boxes"), "{text}");
+}
+
 /// Writes a document of lines with closures, corrections and a bad factor.
-fn write_lines(folder: &Path) -> String {
+fn write_lines(folder: &Path) -> RunDocument {
     let (_, sequence) = scene(TABLE);
     let truth = true_poses(&sequence);
     let mut frames = with_odometry(&sequence, &drifted(&truth));
@@ -276,24 +323,13 @@ fn write_lines(folder: &Path) -> String {
     frames[60].pose_graph.corrected.push(corrected);
     frames[70].pose_graph.removed.push("loop".into());
     let lines: Vec<String> = frames.iter().map(format_line).collect();
-    std::fs::write(folder.join("frames.jsonl"), lines.join("\n")).unwrap();
-    let camera = r#"{ fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }"#;
-    let source = format!(
-        r#"source = {{ type = "json_lines", camera = {camera}, file = "frames.jsonl", up = [0, 0, 1] }}"#
-    );
-    TABLE
-        .lines()
-        .map(|line| if line.starts_with("source") { &source } else { line })
-        .collect::<Vec<_>>()
-        .join("\n")
+    document_of_lines(folder, &lines, "")
 }
 
 #[test]
 fn lines_give_the_same_graph_to_a_batch_and_a_stream_also_from_a_journal() {
     let folder = tempfile::tempdir().unwrap();
-    let document = write_lines(folder.path());
-    let mut run = run_of(&document, &[]);
-    run.folder = folder.path().into();
+    let run = write_lines(folder.path());
     let variant = &run.variants[0];
     let batch = Run::new(&run, None).run_variant(variant, &mut Silent).unwrap().0;
     let stream = |journal: Option<&str>| {
@@ -328,5 +364,94 @@ fn lines_give_the_same_graph_to_a_batch_and_a_stream_also_from_a_journal() {
         let cut = format!("cut{share}.jsonl");
         std::fs::write(folder.path().join(&cut), &journal[..journal.len() * share / 8]).unwrap();
         assert_eq!(text(&stream(Some(&cut)).0), text(&whole));
+    }
+}
+
+/// Faulty values of fields, with a word of the message.
+const FAULTS: &[(&str, &str, &str)] = &[
+    ("timestamp", "null", "f64"),
+    ("timestamp", "\"1\"", "f64"),
+    ("timestamp", "-7.0", "does not come after"),
+    ("pose", "{}", "translation"),
+    ("pose", "{\"translation\": [0, 0, null], \"rotation\": [0, 0, 0, 1]}", "f64"),
+    ("pose", "{\"translation\": [0, 0, 0], \"rotation\": [0, 0, 0, 0]}", "quaternion"),
+    ("pose", "7", "expected"),
+    ("surprise", "1", "surprise"),
+    ("odometry_noise", "{\"sigma\": 0}", "above zero"),
+    ("odometry_noise", "{\"sigma\": NaN}", "null"),
+    ("odometry_noise", "{\"sigmas\": [1, 1, 1]}", "the noise has 3"),
+    ("odometry_noise", "{\"covariance\": [[1, 2], [2, 1]]}", "positive definite"),
+    ("odometry_noise", "{\"covariance\": [[1, 0], [1, 1]]}", "symmetric"),
+    ("odometry_noise", "{\"sigma\": 1, \"sigmas\": [1]}", "expected one of"),
+    ("odometry_noise", "\"small\"", "odometry_noise"),
+    ("factors", "7", "expected a list"),
+    ("factors", "[null]", "factors 1"),
+    ("factors", "[{}]", "keys"),
+    ("factors", "[{\"keys\": [true], \"factor\": BETWEEN, \"noise\": {}}]", "the timestamp of a frame"),
+    ("factors", "[{\"keys\": [], \"factor\": BETWEEN, \"noise\": {}}]", "`keys` is empty"),
+    ("factors", "[{\"keys\": [0.0, 77.0], \"factor\": BETWEEN, \"noise\": {}}]", "no frame at 77 s"),
+    ("factors", "[{\"keys\": [0.0, NaN], \"factor\": BETWEEN, \"noise\": {}}]", "the timestamp of a frame"),
+    ("factors", "[{\"keys\": [0.0], \"factor\": BETWEEN, \"noise\": {}}]", "connects 2 variables"),
+    ("factors", "[{\"keys\": [0.0, 0.0], \"factor\": BETWEEN, \"noise\": {}}]", "twice"),
+    ("factors", "[{\"keys\": [0.0, \"q1\"], \"factor\": BETWEEN, \"noise\": {}}]", "may not be named here"),
+    ("factors", "[{\"keys\": [0.0, \"door\"], \"factor\": BETWEEN, \"noise\": {}}]", "door"),
+    ("factors", "[{\"keys\": [0.0, 0.1], \"factor\": {\"type\": \"closure\"}, \"noise\": {}}]", "closure"),
+    (
+        "factors",
+        "[{\"keys\": [0.0, 0.1], \"factor\": {\"type\": \"between_se3\"}, \"noise\": {}}]",
+        "relative",
+    ),
+    ("factors", "[{\"keys\": [0.0, 0.1], \"factor\": BETWEEN}]", "noise"),
+    ("factors", "[{\"keys\": [0.0, 0.1], \"factor\": BETWEEN, \"noise\": {\"sigma\": -1}}]", "above zero"),
+    (
+        "factors",
+        "[{\"keys\": [0.0, 0.1], \"factor\": BETWEEN, \"noise\": {\"sigmas\": [1, 1]}}]",
+        "the noise has 2",
+    ),
+    (
+        "factors",
+        "[{\"keys\": [0.0, 0.1], \"factor\": BETWEEN, \"noise\": {}, \"loss\": {\"type\": \"hubert\"}}]",
+        "hubert",
+    ),
+    ("factors", "[{\"id\": 7, \"keys\": [0.0, 0.1], \"factor\": BETWEEN, \"noise\": {}}]", "factors 1"),
+    ("removed", "[\"nothing\"]", "no such factor"),
+    ("removed", "[7]", "removed 1"),
+    ("removed", "\"loop\"", "expected a list"),
+    ("corrected", "[{\"timestamp\": 99.0, \"pose\": POSE}]", "no frame at 99 s"),
+    ("corrected", "[{\"timestamp\": 0.0}]", "pose"),
+    ("corrected", "[{\"timestamp\": NaN, \"pose\": POSE}]", "corrected 1"),
+    ("corrected", "{}", "expected a list"),
+];
+
+#[test]
+fn a_faulty_field_of_a_line_is_reported_and_the_frames_around_it_stay() {
+    let (settings, sequence) = scene(TABLE);
+    let lines: Vec<String> = sequence.observations().take(12).map(|frame| format_line(&frame)).collect();
+    let pose = r#"{"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}"#;
+    let between = format!(r#"{{"type": "between_se3", "relative": {pose}}}"#);
+    for (place, (field, value, words)) in
+        [3, 6, 10].into_iter().flat_map(|i| FAULTS.iter().map(move |f| (i, f)))
+    {
+        let value = value.replace("BETWEEN", &between).replace("POSE", pose);
+        let mut line: serde_json::Map<String, serde_json::Value> =
+            serde_json::from_str(&lines[place]).unwrap();
+        line.insert((*field).into(), "REPLACED".into());
+        let faulty = serde_json::to_string(&line).unwrap().replace("\"REPLACED\"", &value);
+        let mut mapper = Mapper::new(sequence.header(), &settings);
+        let (mut messages, mut accepted) = (vec![], 0);
+        for (i, line) in lines.iter().enumerate() {
+            let line = if i == place { &faulty } else { line };
+            match parse(line.as_bytes()).map(|frame| mapper.add_frame(&frame)) {
+                Ok(Ok(report)) => {
+                    accepted += 1;
+                    messages.extend(report.refused);
+                }
+                Ok(Err(error)) => messages.push(error.to_string()),
+                Err(error) => messages.push(error),
+            }
+        }
+        assert!(messages.len() == 1 && messages[0].contains(words), "{field} {value}: {messages:?}");
+        let is_whole = !["timestamp", "pose", "surprise"].contains(field);
+        assert_eq!(accepted, if is_whole { 12 } else { 11 }, "{field} {value}");
     }
 }

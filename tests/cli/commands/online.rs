@@ -1,7 +1,8 @@
 use crate::endings::interrupt::AtWork;
 use crate::{fed, folder, manifactor, path, root};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
-use serde_json::Value;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::time::Duration;
@@ -48,6 +49,30 @@ fn frames_are_told_in_lines_of_json() {
     let frames: Vec<u64> = told.iter().map(|line| line["report"]["frame"].as_u64().unwrap()).collect();
     assert_eq!(frames, [29, 59]);
     assert_eq!(end["variants"][0]["online"]["objects"], told[1]["objects"]);
+}
+
+#[test]
+fn lines_with_a_map_have_all_changes_of_objects() {
+    let folder = folder(&[("desk.toml", DESK)]);
+    let (desk, out) = (path(&folder, "desk.toml"), path(&folder, "out"));
+    manifactor(&format!("online {desk} --out {out} --map")).ended(2).complains("--json");
+    let ran = manifactor(&format!("online {desk} --out {out} --every 1 --json --map")).ended(0);
+    let lines: Vec<Value> = ran.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let mut objects: BTreeMap<u64, Value> = BTreeMap::new();
+    let is_mapped = |object: &&Value| object["state"] == "mapped";
+    for line in lines.iter().filter(|line| line["report"].is_object()) {
+        for object in line["map"].as_array().unwrap() {
+            objects.insert(object["id"].as_u64().unwrap(), object.clone());
+        }
+        let mapped = objects.values().filter(is_mapped).count() as u64;
+        assert_eq!(line["objects"].as_u64(), Some(mapped));
+    }
+    let one = objects.values().find(is_mapped).unwrap();
+    let rows = one["covariance"].as_array().unwrap();
+    assert!(rows.len() == 9 && rows[8].as_array().unwrap().len() == 9 && rows[4][4].as_f64().unwrap() > 0.0);
+    assert!(one["class"].is_string() && one["quadric"]["semi_axes"][0].as_f64().unwrap() > 0.0, "{one}");
+    let first = lines[0]["map"].as_array().unwrap();
+    assert!(!first.is_empty() && first.iter().all(|object| object["state"] == "tentative"), "{first:?}");
 }
 
 #[test]
@@ -172,12 +197,34 @@ fn waiting(command: &str, stderr: Stdio, lines: &str, count: usize) -> (Child, C
     (child, input)
 }
 
+/// Adds a loop closure at frame 20, replaces it at frame 28, and corrects the poses of two frames at frame 36.
+fn with_closures(frames: &str) -> String {
+    let mut lines: Vec<Value> = frames.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let closure = |lines: &[Value], to: usize| {
+        let identity = json!({ "translation": [0.5, 0.0, 0.1], "rotation": [0.0, 0.1, 0.0, 0.995] });
+        let factor = json!({ "type": "between_se3", "relative": identity });
+        let keys = [&lines[0]["timestamp"], &lines[to]["timestamp"]];
+        json!([{ "id": "loop", "keys": keys, "factor": factor, "noise": { "sigma": 0.5 } }])
+    };
+    for frame in [20, 28] {
+        lines[frame]["factors"] = closure(&lines, frame - 5);
+    }
+    let corrected = |frame: &Value| {
+        let mut pose = frame["pose"].clone();
+        pose["translation"][0] = json!(pose["translation"][0].as_f64().unwrap() + 0.03);
+        json!({ "timestamp": frame["timestamp"], "pose": pose })
+    };
+    lines[36]["corrected"] = json!([corrected(&lines[10]), corrected(&lines[30])]);
+    lines.iter().map(|line| format!("{line}\n")).collect()
+}
+
 #[test]
 fn a_stream_that_is_killed_at_any_moment_goes_on_with_the_same_map() {
     let folder = folder(&[("desk.toml", DESK), ("live.toml", LIVE)]);
     let (live, whole, out) = (path(&folder, "live.toml"), path(&folder, "whole"), path(&folder, "out"));
     let journal = path(&folder, "frames.jsonl");
     let frames = manifactor(&format!("simulate {} --lines", path(&folder, "desk.toml"))).ended(0).stdout;
+    let frames = with_closures(&frames);
     fed(&format!("online {live} --out {whole} --journal {whole}.jsonl"), &frames).ended(0);
     let command = format!("online {live} --out {out} --journal {journal} --force");
     let mut rng = StdRng::seed_from_u64(5);

@@ -16,11 +16,8 @@ use std::collections::HashMap;
 /// rounds to about 1e-15.
 const MIN_CHANGE: f64 = 1e-9;
 
-/// Share of relinearized variables above which a change of the pose graph is followed by further updates. The
-/// positions of a satellite receiver at each frame stay below.
-const SETTLING_SHARE: f64 = 0.125;
-/// Largest number of these updates, and the relative decrease of the cost below which they end.
-const MAX_SETTLING_UPDATES: usize = 5;
+/// Largest number of updates after a correction, and the relative decrease of the cost below which they end.
+const MAX_SETTLING_UPDATES: usize = 6;
 const MIN_COST_DECREASE: f64 = 1e-3;
 
 impl Mapper {
@@ -51,7 +48,7 @@ impl Mapper {
                 return;
             }
         }
-        if let Err(why) = self.update_and_settle(report) {
+        if let Err(why) = self.update_until_settled(report) {
             self.frames = before;
             report.refused.push(format!("the corrected poses: {why}"));
             return;
@@ -63,6 +60,24 @@ impl Mapper {
         for id in self.objects.iter().filter_map(is_tentative).collect::<Vec<_>>() {
             self.objects.insert(id, ObjectState::Tentative(self.viewing_directions(id)));
         }
+    }
+
+    /// Updates the smoother until the cost no longer decreases much. The first error is returned; after it, nothing
+    /// has changed.
+    fn update_until_settled(&mut self, report: &mut FrameReport) -> Result<(), UpdateError> {
+        report.updates.push(self.smoother.update()?);
+        // the second update without a change relinearizes all variables that still move
+        let mut cost = f64::INFINITY;
+        for _ in 0..MAX_SETTLING_UPDATES {
+            let Ok(update) = self.smoother.update() else { break };
+            report.updates.push(update);
+            let now = self.smoother.cost();
+            if now > (1.0 - MIN_COST_DECREASE) * cost {
+                break;
+            }
+            cost = now;
+        }
+        Ok(())
     }
 
     /// Moves poses and objects by the corrections of their frames, so that the update starts near its result. An
@@ -166,31 +181,13 @@ impl Mapper {
         if changed == 0 {
             return;
         }
-        if let Err(why) = self.update_and_settle(report) {
-            self.pose_factors = before;
-            report.refused.push(format!("the factors on poses: {why}"));
-        }
-    }
-
-    /// Updates the smoother. If a large part of the map moves, more updates bring it to the minimum.
-    fn update_and_settle(&mut self, report: &mut FrameReport) -> Result<(), UpdateError> {
-        let update = self.smoother.update()?;
-        let is_large = update.relinearized as f64 > SETTLING_SHARE * self.smoother.variables() as f64;
-        report.updates.push(update);
-        if is_large {
-            // the second update without a change relinearizes all variables that still move
-            report.updates.push(self.smoother.update()?);
-            let mut cost = f64::INFINITY;
-            for _ in 0..MAX_SETTLING_UPDATES {
-                let now = self.smoother.cost();
-                if now > (1.0 - MIN_COST_DECREASE) * cost {
-                    break;
-                }
-                cost = now;
-                report.updates.push(self.smoother.update()?);
+        match self.smoother.update() {
+            Ok(update) => report.updates.push(update),
+            Err(why) => {
+                self.pose_factors = before;
+                report.refused.push(format!("the factors on poses: {why}"));
             }
         }
-        Ok(())
     }
 
     /// Adds a factor, or replaces the one with its id.

@@ -31,14 +31,14 @@ struct Line {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     odometry_noise: Option<Value>,
     /// New factors on poses.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    factors: Vec<Value>,
+    #[serde(default, skip_serializing_if = "is_empty")]
+    factors: Value,
     /// Ids of factors to remove.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    removed: Vec<Value>,
+    #[serde(default, skip_serializing_if = "is_empty")]
+    removed: Value,
     /// Corrected poses of earlier frames.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    corrected: Vec<Value>,
+    #[serde(default, skip_serializing_if = "is_empty")]
+    corrected: Value,
 }
 
 /// A corrected pose of an earlier frame.
@@ -79,6 +79,10 @@ struct AccelerometerReading {
     acceleration: Vector3<f64>,
 }
 
+fn is_empty(list: &Value) -> bool {
+    list.as_array().is_none_or(Vec::is_empty)
+}
+
 fn certain_score() -> Share {
     Share::literal(1.0)
 }
@@ -108,38 +112,45 @@ pub fn format_line(observation: &Observation) -> String {
     let line = Line {
         timestamp: observation.frame.timestamp,
         pose: Some(observation.frame.world_from_camera),
-        boxes: Some(to_values(observation.detections.iter().map(of_box))),
+        boxes: Some(values_of(observation.detections.iter().map(of_box))),
         accelerometer: observation.accelerometer.iter().map(of_reading).collect(),
         odometry_noise: observation
             .frame
             .odometry_noise
             .as_deref()
             .and_then(|n| serde_json::to_value(n).ok()),
-        factors: to_values(&observation.pose_graph.factors),
-        removed: to_values(&observation.pose_graph.removed),
-        corrected: to_values(observation.pose_graph.corrected.iter().map(of_pose)),
+        factors: values_of(&observation.pose_graph.factors).into(),
+        removed: values_of(&observation.pose_graph.removed).into(),
+        corrected: values_of(observation.pose_graph.corrected.iter().map(of_pose)).into(),
     };
     serde_json::to_string(&line).unwrap_or_default()
 }
 
-fn to_values(items: impl IntoIterator<Item = impl Serialize>) -> Vec<Value> {
+fn values_of(items: impl IntoIterator<Item = impl Serialize>) -> Vec<Value> {
     items.into_iter().filter_map(|item| serde_json::to_value(item).ok()).collect()
 }
 
-/// Reads the items of a list. Items that cannot be read are left out and reported.
+/// Reads the items of a list. Items that cannot be read are left out and reported; so is a value that is no list.
 fn read_items<T: DeserializeOwned>(
-    items: Vec<Value>,
+    list: Value,
     field: &str,
     timestamp: f64,
     unused: &mut Vec<UnusedInput>,
 ) -> Vec<T> {
-    let read = |(place, item): (usize, Value)| match serde_json::from_value(item) {
-        Ok(item) => Some(item),
-        Err(error) => {
-            let field = format!("{field} {}", place + 1);
-            unused.push(UnusedInput::PoseGraph { timestamp, field, fault: error.to_string() });
-            None
+    let mut report = |field: String, fault: String| {
+        unused.push(UnusedInput::PoseGraph { timestamp, field, fault });
+    };
+    let items = match list {
+        Value::Null => vec![],
+        Value::Array(items) => items,
+        other => {
+            report(field.to_owned(), format!("expected a list, got {other}"));
+            vec![]
         }
+    };
+    let read = |(place, item): (usize, Value)| {
+        let read = serde_json::from_value(item);
+        read.map_err(|error| report(format!("{field} {}", place + 1), error.to_string())).ok()
     };
     items.into_iter().enumerate().filter_map(read).collect()
 }

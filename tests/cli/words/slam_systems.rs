@@ -1,0 +1,48 @@
+//! `docs/slam-systems.md`: its document maps a recording, and its line is a frame with a closure.
+use crate::{fed, folder, manifactor, path, root};
+
+const CAMERA: &str = "camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
+
+/// Returns the first block of `language` in the page that contains `text`.
+fn block(language: &str, text: &str) -> String {
+    let page = std::fs::read_to_string(root().join("docs/slam-systems.md")).unwrap();
+    let opening = format!("```{language}\n");
+    let mut blocks = page.split(&opening).skip(1).filter_map(|rest| rest.split("```").next());
+    blocks
+        .find(|block| block.contains(text))
+        .unwrap_or_else(|| panic!("no {language} with {text}"))
+        .to_owned()
+}
+
+#[test]
+fn a_trajectory_of_another_program_is_mapped() {
+    let document = block("toml", "CameraTrajectory.txt");
+    let camera = document.lines().find(|line| line.starts_with("camera =")).unwrap();
+    let folder = folder(&[("office.toml", &document.replace(camera, CAMERA))]);
+    let (office, recording) = (path(&folder, "office.toml"), path(&folder, "office"));
+    manifactor(&format!("simulate examples/desk/desk.toml --out {recording}")).ended(0);
+    // a trajectory at half of the rate, as of a slower program
+    let odometry = std::fs::read_to_string(format!("{recording}/odometry.txt")).unwrap();
+    let slower: Vec<&str> = odometry.lines().filter(|line| !line.starts_with('#')).step_by(2).collect();
+    std::fs::write(format!("{recording}/CameraTrajectory.txt"), slower.join("\n")).unwrap();
+    let ran = manifactor(&format!("run {office} --out {} --json", path(&folder, "out"))).ended(0);
+    let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    let counts = &report["variants"][0]["counts"];
+    // the last image comes after the last pose
+    assert!(counts["frames"].as_u64().unwrap() >= 198, "{counts}");
+    assert!(counts["objects"].as_u64().unwrap() >= 12, "{counts}");
+}
+
+#[test]
+fn a_line_with_a_closure_is_a_frame() {
+    let line = block("json", "loop 3");
+    let live = format!("source = {{ type = \"json_lines\", up = [0, -1, 0], {CAMERA} }}");
+    let folder = folder(&[("live.toml", &live)]);
+    let first =
+        r#"{"timestamp": 2.0, "pose": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}, "boxes": []}"#;
+    let (live, out) = (path(&folder, "live.toml"), path(&folder, "out"));
+    let ran = fed(&format!("online {live} --out {out}"), &format!("{first}\n{line}"));
+    assert!(!ran.stderr.contains("left out"), "{}", ran.stderr);
+    let graph = std::fs::read_to_string(format!("{out}/estimate/graph.json")).unwrap();
+    assert!(graph.contains("\"loop 3\""), "{graph}");
+}
