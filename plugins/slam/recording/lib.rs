@@ -12,10 +12,10 @@ pub mod class;
 pub mod fusion;
 pub mod keys;
 pub mod measurement;
-pub mod pose_graph;
 pub mod prior_map;
 pub mod recording;
 pub mod sequence;
 pub mod source;
 
+pub use sequence::pose_graph;
 pub use source::{journal, stream};

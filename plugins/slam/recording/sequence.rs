@@ -4,7 +4,6 @@
 //! `world_from_camera` maps a point in the camera frame to the world frame. The camera looks along +z; in the
 //! image x points right and y down.
 use crate::measurement::Quantities;
-use crate::pose_graph::{PoseFactor, PoseGraphChanges};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, Noise};
@@ -15,9 +14,11 @@ use std::fmt;
 use std::sync::Arc;
 
 mod observations;
+pub mod pose_graph;
 
 pub use crate::keys::ObjectId;
 pub(crate) use observations::Observations;
+use pose_graph::{PoseFactor, PoseGraphChanges};
 
 /// A recording of one camera that moves among objects.
 #[derive(Debug, Clone)]

@@ -1,4 +1,5 @@
 //! The verdict on a run: one sentence above the map.
+use manifactor_quadric::LandmarkError;
 use manifactor_slam::record::{ObjectRecord, RunRecord, VariantRecord};
 use manifactor_slam::report::{RunReport, VariantReport};
 
@@ -13,27 +14,35 @@ pub(super) fn verdict(report: &RunReport, record: &RunRecord) -> Option<String> 
     let name = &last.name;
     if !changes.is_empty() {
         let changes = changes.join(", ");
-        return Some(format!("{name} beside {}: {changes}. A negative number is better.", first.name));
+        let (before, after) = (first.counts.objects, last.counts.objects);
+        let objects = match before == after {
+            true => String::new(),
+            false => format!("{after} objects in place of {before}; "),
+        };
+        let first = &first.name;
+        return Some(format!("{name} beside {first}: {objects}{changes}. A negative change is better."));
     }
     let parts = [own_errors(last), held_out(first, last), size(last)];
     parts.into_iter().flatten().next().map(|part| format!("{name}: {part}."))
 }
 
-/// Returns the changes of the errors from the first to the last variant.
+/// Returns the changes of the errors from the first to the last variant. Errors of objects are means over the
+/// objects that both variants have.
 fn changes(
     (first, first_record): (&VariantReport, &VariantRecord),
     (last, last_record): (&VariantReport, &VariantRecord),
 ) -> Vec<String> {
     let (before, after) = (first.row(), last.row());
-    let volumes = volume_errors(first_record, last_record);
+    let of_objects = |measure: fn(&LandmarkError) -> f64| mean_errors(first_record, last_record, measure);
     let errors = [
-        ("position error", before.position, after.position),
-        ("volume error", volumes.map(|[before, _]| before), volumes.map(|[_, after]| after)),
-        ("shape error", before.shape, after.shape),
-        ("ATE", before.ate, after.ate),
+        ("position error", of_objects(|error| error.position)),
+        ("volume error", of_objects(|error| error.volume)),
+        ("shape error", of_objects(|error| error.shape)),
+        ("ATE", before.ate.zip(after.ate).map(|(before, after)| [before, after])),
     ];
-    let change = |(name, before, after): (&str, Option<f64>, Option<f64>)| {
-        Some(format!("{name} {}", percent(relative(before?, after?)?)))
+    let change = |(name, errors): (&str, Option<[f64; 2]>)| {
+        let [before, after] = errors?;
+        Some(format!("{name} {}", percent(relative(before, after)?)))
     };
     errors.into_iter().filter_map(change).collect()
 }
@@ -88,20 +97,18 @@ fn size(report: &VariantReport) -> Option<String> {
     ))
 }
 
-/// Returns the mean volume errors of the objects that both variants have.
-fn volume_errors(first: &VariantRecord, last: &VariantRecord) -> Option<[f64; 2]> {
+/// Returns the mean errors of the objects that both variants have.
+fn mean_errors(
+    first: &VariantRecord,
+    last: &VariantRecord,
+    measure: fn(&LandmarkError) -> f64,
+) -> Option<[f64; 2]> {
+    let error = |object: &ObjectRecord| object.error.as_ref().map(measure).filter(|error| error.is_finite());
     let other = |id| last.objects.iter().find(|object| object.id == id);
-    let pair = |object: &ObjectRecord| Some([volume_error(object)?, volume_error(other(object.id)?)?]);
+    let pair = |object: &ObjectRecord| Some([error(object)?, error(other(object.id)?)?]);
     let pairs: Vec<[f64; 2]> = first.objects.iter().filter_map(pair).collect();
     let mean = |place: usize| pairs.iter().map(|pair| pair[place]).sum::<f64>() / pairs.len() as f64;
     (!pairs.is_empty()).then(|| [mean(0), mean(1)])
-}
-
-/// Returns |ln(V / V_true)|, with the volume V_true of the ellipsoid that fills the true cuboid.
-fn volume_error(object: &ObjectRecord) -> Option<f64> {
-    let (estimate, truth) = (object.estimate.as_ref()?, object.truth.as_ref()?);
-    let ratio = estimate.semi_axes.product() / truth.half_extents.iter().product::<f64>();
-    Some(ratio.ln().abs()).filter(|error| error.is_finite())
 }
 
 #[cfg(test)]

@@ -98,7 +98,7 @@ fn observations(text: &str) -> Vec<Observation> {
         let frames = all.len();
         match (word(0), all.last_mut()) {
             ("frame", _) if frames < LONGEST => {
-                all.push(Observation::new(Frame::new(number(1), Se3::new(So3::exp(&vector(5)), vector(2)))))
+                all.push(Observation::new(Frame::new(number(1), Se3::new(So3::exp(&vector(5)), vector(2)))));
             }
             ("box", Some(last)) if last.detections.len() < LONGEST => {
                 let [xmin, ymin, xmax, ymax] = std::array::from_fn(|i| number(2 + i));

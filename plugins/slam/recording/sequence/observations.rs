@@ -1,6 +1,6 @@
 //! The frames of a sequence, one by one.
+use super::pose_graph::{PoseFactor, PoseGraphChanges, correct_frames};
 use super::{Detection, Observation, Sequence, UnusedInput};
-use crate::pose_graph::{PoseFactor, PoseGraphChanges, correct_frames};
 
 /// Frames of a sequence in order of arrival. A reading of the accelerometer belongs to the first frame at or
 /// after its time.

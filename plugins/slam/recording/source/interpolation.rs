@@ -1,6 +1,6 @@
 //! Poses at the times of images, between the poses of a source.
 use super::SourceError;
-use crate::pose_graph::PoseGraphChanges;
+use crate::sequence::pose_graph::PoseGraphChanges;
 use crate::sequence::{Acceleration, Observation, UnusedInput};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;

@@ -1,7 +1,7 @@
 //! A frame as a line of JSON.
 use super::super::interpolation::PoseOrImage;
 use crate::measurement::Quantities;
-use crate::pose_graph::{PoseFactor, PoseGraphChanges};
+use crate::sequence::pose_graph::{PoseFactor, PoseGraphChanges};
 use crate::sequence::{Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, UnusedInput};
 use indexmap::IndexMap;
 use manifactor_formats::tum::StampedPose;

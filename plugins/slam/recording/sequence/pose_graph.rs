@@ -1,7 +1,7 @@
 //! Measurements of poses besides odometry: loop closures, positions from satellites, markers, and corrected
 //! poses of the SLAM system that provides the odometry.
+use super::Frame;
 use crate::keys::{key_number, pose_key};
-use crate::sequence::Frame;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::loss::Loss;
