@@ -1,7 +1,7 @@
 //! Benchmark programs, and two data associations for comparison.
 //!
-//! Each file in `examples` prints a table of the pages in `docs/`; its first lines describe its arguments:
-//! `cargo run --release -p manifactor-bench --example NAME`.
+//! `cargo run --release -p manifactor-bench -- measure NAME` runs the benchmark in `benchmarks/NAME.rs`.
+//! They are commands of one program, because each program links the whole library.
 //!
 //! The associations `iou` and `projection` form an external plugin: they use only the public crates, and
 //! register themselves by name. `cargo run --release -p manifactor-bench -- run RUN.toml` is the command

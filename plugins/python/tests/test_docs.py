@@ -23,11 +23,12 @@ def test_an_example_of_the_book_runs(number: int, tmp_path: Path, monkeypatch: p
     exec(compile(block, f"{BOOK.name}, block {number}", "exec"), {"__name__": "book"})  # noqa: S102
 
 
-def test_the_example_of_the_readme_runs() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("page", ["README.md", "plugins/python/README.md"])
+def test_the_example_of_a_readme_runs(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
     (block,) = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
     space: dict[str, object] = {}
-    exec(compile(block, "README.md", "exec"), space)  # noqa: S102
+    exec(compile(block, page, "exec"), space)  # noqa: S102
     assert space["solution"].converged  # type: ignore[attr-defined]
 
 

@@ -1,7 +1,7 @@
 //! Time of covariances: of all variables, of one after them, and of one that is requested first.
 //!
-//! `cargo run --release -p manifactor-bench --example marginals -- GRAPH.g2o…`: milliseconds, medians of nine.
-#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
+//! `cargo run --release -p manifactor-bench -- measure marginals GRAPH.g2o…`: milliseconds, medians of nine.
+use super::{Arguments, BenchmarkResult};
 use manifactor_formats::pose_graph::{self, PoseGraphOptions};
 use manifactor_solve::{Auto, Problem, Silent, solve};
 use std::time::Instant;
@@ -11,10 +11,10 @@ fn median(mut times: Vec<f64>) -> f64 {
     times[times.len() / 2]
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(super) fn run(arguments: Arguments) -> BenchmarkResult {
     println!("| graph | factorize | all | one, first | one, after |");
     println!("| --- | ---: | ---: | ---: | ---: |");
-    for path in std::env::args().skip(1) {
+    for path in arguments {
         let loaded = pose_graph::read(&path, &PoseGraphOptions::default())?;
         let (graph, values) = (loaded.graph, loaded.values);
         let solution = solve(&graph, &values, &Auto::default(), &mut Silent)?;

@@ -1,6 +1,6 @@
 //! Time to linearize a factor given as a formula, compared with the same factor in Rust:
-//! `cargo run --release -p manifactor-bench --example formulas`
-#![allow(clippy::print_stdout)]
+//! `cargo run --release -p manifactor-bench -- measure formulas`
+use super::BenchmarkResult;
 use manifactor_expression::{Constant, Expression};
 use manifactor_geometry::{Between, Coordinates, Landmark, Point3, Se3, So3};
 use manifactor_graph::{Factor, Graph, Values};
@@ -52,7 +52,7 @@ fn time(
     Ok(best * 1e9 / COUNT as f64)
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+pub(super) fn run() -> BenchmarkResult {
     let values = values();
     let row = |name: &str, rust: f64, formula: f64| {
         println!("{name:<28} {rust:>8.0} {formula:>8.0} {:>6.1}", formula / rust);

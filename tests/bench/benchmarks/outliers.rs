@@ -1,14 +1,14 @@
 //! Replays pose graphs with false loop closures among the true ones, and compares the rejections of a
 //! session with batch graduated non-convexity.
 //!
-//! `cargo run --release -p manifactor-bench --example outliers -- [--share PERCENT]… [--seeds N] [--first
+//! `cargo run --release -p manifactor-bench -- measure outliers [--share PERCENT]… [--seeds N] [--first
 //! SEED] [--clusters N] [--batch] GRAPH.g2o…`. `--share` is the number of false closures per hundred true
 //! ones. They connect random poses, with a relative pose of up to 10 m and 3.1 rad. With `--clusters N`
 //! they come in runs of N consistent ones, like two places that look alike. Precision is the share of false
 //! closures among the rejected ones, recall the share of rejected closures among the false ones. Times are
 //! CPU times of one thread in milliseconds. The cost is ½ Σ ‖r‖² of the true factors at the end, including
 //! rejected ones, divided by that of their optimum.
-#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
+use super::{Arguments, BenchmarkResult, cpu_seconds};
 use manifactor_formats::pose_graph::{self, PoseGraphOptions};
 use manifactor_formats::replay::{GraphReplay, Latencies};
 use manifactor_geometry::{Between, Se2, Se3};
@@ -19,11 +19,6 @@ use nalgebra::{Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::collections::HashSet;
-
-fn cpu_seconds() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
 
 fn number(key: &Key) -> usize {
     key.as_str()[1..].parse().unwrap()
@@ -149,10 +144,9 @@ fn batch(truth: &Graph, misled: &Misled, from: &Values) -> Line {
     Line { name: "gnc".into(), precision, recall, lost, latencies, cost: cost(truth, &solution.values) }
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(super) fn run(mut arguments: Arguments) -> BenchmarkResult {
     let (mut shares, mut first, mut seeds, mut cluster, mut with_batch, mut files) =
         (vec![], 1, 1, 1, false, vec![]);
-    let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut next = || arguments.next().ok_or(format!("{argument} takes a number"));
         match argument.as_str() {

@@ -1,14 +1,14 @@
 //! Pose graphs from different initial values: cost and time of the start, the cost after a solve from it,
 //! and whether that is the global minimum.
 //!
-//! `cargo run --release -p manifactor-bench --example starts -- FILE...`
-#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
+//! `cargo run --release -p manifactor-bench -- measure starts FILE...`
+use super::{Arguments, BenchmarkResult};
 use manifactor_formats::pose_graph::{self, PoseGraphOptions};
 use manifactor_geometry::{Chordal, SpanningTree, Tree, certify};
 use manifactor_solve::{GaussNewton, GivenStart, LevenbergMarquardt, Optimizer, Silent, Start, solve};
 use std::time::Instant;
 
-fn main() {
+pub(super) fn run(arguments: Arguments) -> BenchmarkResult {
     let starts: [(&str, Box<dyn Start>); 4] = [
         ("given", Box::new(GivenStart {})),
         ("chain", Box::new(SpanningTree { tree: Tree::Chain })),
@@ -17,7 +17,7 @@ fn main() {
     ];
     let optimizers: [(&str, Box<dyn Optimizer>); 2] =
         [("lm", Box::new(LevenbergMarquardt::default())), ("gn", Box::new(GaussNewton::default()))];
-    for path in std::env::args().skip(1) {
+    for path in arguments {
         let loaded = pose_graph::read(&path, &PoseGraphOptions::default()).unwrap();
         let name = std::path::Path::new(&path).file_stem().unwrap().to_string_lossy().into_owned();
         for (start, strategy) in &starts {
@@ -51,4 +51,5 @@ fn main() {
             }
         }
     }
+    Ok(())
 }

@@ -1,11 +1,11 @@
 //! Reuse of a map: made from one part of a sequence, then relocalized in and extended by further parts.
 //!
-//! `reuse RUN.toml FROM..TO START[..END]… [KEY=VALUE…]`: frames FROM to TO make the map. Each stream begins
-//! at frame START with an unknown pose, and ends at END or with the sequence; `OTHER.toml:START` is a
-//! stream of a different document. For each stream, it prints the number of frames before the
-//! relocalization, and the pose errors at that frame and at the end, against the ground truth in the map's
-//! frame. The variant is the one called `ours`, or the last.
-#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
+//! `measure reuse RUN.toml FROM..TO START[..END]… [KEY=VALUE…]`: frames FROM to TO make the map. Each
+//! stream begins at frame START with an unknown pose, and ends at END or with the sequence;
+//! `OTHER.toml:START` is a stream of a different document. For each stream, it prints the number of frames
+//! before the relocalization, and the pose errors at that frame and at the end, against the ground truth in
+//! the map's frame. The variant is the one called `ours`, or the last.
+use super::{Arguments, BenchmarkResult};
 use manifactor_config::Document;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -89,8 +89,8 @@ fn range(text: &str, all: usize) -> Range<usize> {
     from.parse().unwrap()..to.parse().unwrap_or(all)
 }
 
-fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+pub(super) fn run(arguments: Arguments) -> BenchmarkResult {
+    let arguments: Vec<String> = arguments.collect();
     let (sets, places): (Vec<_>, Vec<_>) =
         arguments.iter().skip(1).partition(|argument| argument.contains('='));
     // settings of the prior map apply only to runs that have one
@@ -161,4 +161,5 @@ fn main() {
             shift,
         );
     }
+    Ok(())
 }

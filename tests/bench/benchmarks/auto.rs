@@ -1,14 +1,14 @@
 //! Cost of the default solver compared with plain Gauss-Newton from the same initial values, for any unit
 //! of the noise. Prints a table in Markdown.
 //!
-//! `RAYON_NUM_THREADS=1 cargo run --release -p manifactor-bench --example auto -- FILE...`
+//! `RAYON_NUM_THREADS=1 cargo run --release -p manifactor-bench -- measure auto FILE...`
 //!
 //! Each pose graph is solved with its information times 1, 2, 4 and 100, by `gauss_newton`, by `auto`, and
 //! by Gauss-Newton from a chordal start, in turns. Each solve is complete, including compilation. Times are
 //! CPU times, the least of at least nine turns, and of as many turns as fit into three seconds, at most a
 //! hundred. The last graph does not come from a file: a sphere of poses with so much rotational noise that
 //! its odometry is useless as an initial guess.
-#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
+use super::{Arguments, BenchmarkResult, cpu_seconds};
 use manifactor_formats::pose_graph::{self, PoseGraphOptions};
 use manifactor_geometry::{Between, Chordal, Se3};
 use manifactor_graph::{Graph, Key, Noise, Values};
@@ -23,13 +23,13 @@ const TIMES: [f64; 4] = [1.0, 2.0, 4.0, 100.0];
 /// Largest relative difference of the costs of two solves at the same minimum.
 const SAME: f64 = 1e-6;
 
-fn main() {
+pub(super) fn run(arguments: Arguments) -> BenchmarkResult {
     println!(
         "| graph | Ω times | gauss_newton, ms | iterations | cost | auto, ms | iterations | cost | ratio | chordal + gauss_newton, ms |"
     );
     println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     let mut worst: f64 = 0.0;
-    for path in std::env::args().skip(1) {
+    for path in arguments {
         let loaded = pose_graph::read(&path, &PoseGraphOptions::default()).unwrap();
         let name = Path::new(&path).file_stem().unwrap().to_string_lossy().into_owned();
         for times in TIMES {
@@ -41,6 +41,7 @@ fn main() {
         worst = worst.max(row("sphere, σ of rotations 0.3", times, &scaled(&graph, times), &values));
     }
     println!("\nThe largest ratio where both end at the same minimum: {worst:.2}");
+    Ok(())
 }
 
 /// Returns the graph with its information multiplied.
@@ -92,12 +93,6 @@ fn row(name: &str, times: f64, graph: &Graph, values: &Values) -> f64 {
         ms[2]
     );
     ratio
-}
-
-/// CPU time of this thread, independent of the load of the machine. Unit: seconds.
-fn cpu_seconds() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 /// Rings of poses on a sphere, each measured from the previous one and from the one below. Rotations have σ

@@ -1,31 +1,17 @@
 //! Memory and time of a pose graph that is repeated through a moving window.
 //!
-//! `cargo run --release -p manifactor-bench --example window -- [--passes N] [--poses N] GRAPH.g2o`. Each
+//! `cargo run --release -p manifactor-bench -- measure window [--passes N] [--poses N] GRAPH.g2o`. Each
 //! pass drives the graph again from the end of the previous pass, with new names; factors to marginalized
 //! poses are left out. Times are CPU times of one thread in milliseconds.
-#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
+use super::{Arguments, BenchmarkResult, cpu_seconds, resident};
 use manifactor_formats::pose_graph::{self, PoseGraph, PoseGraphOptions};
 use manifactor_formats::replay::{GraphReplay, Latencies};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_smoother::{Smoother, SmootherSettings, Span, Window};
 use std::num::NonZeroUsize;
 
-/// CPU time of this thread, independent of the load of the machine. Unit: seconds.
-fn cpu_seconds() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
-
-/// Resident memory of the process, on systems that report it. Unit: megabytes.
-fn resident() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
-    line.and_then(|line| line.trim().trim_end_matches(" kB").parse::<f64>().ok()).unwrap_or_default() / 1e3
-}
-
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(super) fn run(mut arguments: Arguments) -> BenchmarkResult {
     let (mut passes, mut poses, mut path) = (10, 200, String::new());
-    let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--passes" => passes = arguments.next().ok_or("--passes takes a number")?.parse()?,

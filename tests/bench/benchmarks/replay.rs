@@ -1,24 +1,17 @@
 //! Replays pose graphs through a session, pose by pose. Reports latencies, and the gap between the estimate
 //! and the optimum of the graph so far.
 //!
-//! `cargo run --release -p manifactor-bench --example replay -- [--gaps N] [--clamp] [--json] GRAPH.g2o…`.
+//! `cargo run --release -p manifactor-bench -- measure replay [--gaps N] [--clamp] [--json] GRAPH.g2o…`.
 //! The initial value of each pose comes from its odometry, never from the file's vertices. Times are CPU
 //! times of one thread in milliseconds; the gap is (cost − optimum) / optimum, every N poses.
-#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
+use super::{Arguments, BenchmarkResult, cpu_seconds};
 use manifactor_formats::pose_graph::{self, InformationRepair, PoseGraph, PoseGraphOptions};
 use manifactor_formats::replay::{GraphReplay, Latencies};
 use manifactor_smoother::{Smoother, SmootherSettings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 
-/// CPU time of this thread, independent of the load of the machine. Unit: seconds.
-fn cpu_seconds() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
-
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(super) fn run(mut arguments: Arguments) -> BenchmarkResult {
     let (mut gaps, mut options, mut json, mut files) = (0, PoseGraphOptions::default(), false, vec![]);
-    let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--gaps" => gaps = arguments.next().ok_or("--gaps takes a number")?.parse()?,

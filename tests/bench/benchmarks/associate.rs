@@ -1,10 +1,10 @@
 //! Data association alone, on the poses of the odometry. The settings of `likelihood` were chosen with it.
 //!
-//! `associate [SETTING=VALUE…] [-r] SEQUENCE…`. A sequence is a folder of TUM with its odometry,
+//! `measure associate [SETTING=VALUE…] [-r] SEQUENCE…`. A sequence is a folder of TUM with its odometry,
 //! `1_desk:dvo_vo.txt`, or the seed of a simulated desk: below 100 with objects of all classes, below 200 a
 //! crowd of bottles, else a crowd of three classes. With -r, the mean is over the associations after a
 //! final reconsideration of all frames.
-#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
+use super::{Arguments, BenchmarkResult};
 use manifactor_geometry::Se3;
 use manifactor_quadric::DualQuadric;
 use manifactor_slam::association::{
@@ -84,10 +84,10 @@ fn scores(settings: &LikelihoodAssociation, sequence: &Sequence) -> [IdentitySco
     })
 }
 
-fn main() {
+pub(super) fn run(arguments: Arguments) -> BenchmarkResult {
     let mut settings: Value = serde_json::to_value(LikelihoodAssociation::default()).unwrap();
     let (mut sequences, mut counts) = (vec![], 1);
-    for argument in std::env::args().skip(1) {
+    for argument in arguments {
         match argument.split_once('=') {
             Some((setting, value)) => settings[setting] = from_str(value).unwrap(),
             None if argument == "-r" => counts = 2,
@@ -107,4 +107,5 @@ fn main() {
         sum += scores[counts].f1;
     }
     println!("mean F1 {:.4}", sum / sequences.len() as f64);
+    Ok(())
 }

@@ -1,11 +1,11 @@
 //! Converts a sequence of KITTI tracking to a recording: poses, boxes of a detector, and the numbers of
 //! static objects.
 //!
-//! `kitti FOLDER SEQUENCE OUT`: FOLDER has `orbslam3_poses` (3 × 4, by frame), `label_02` and
+//! `measure kitti FOLDER SEQUENCE OUT`: FOLDER has `orbslam3_poses` (3 × 4, by frame), `label_02` and
 //! `pointrcnn_car`. A box gets the number of the track whose box it overlaps most, if the overlap is at
 //! least one half and the object stays within 2 m of one place in 10 frames or more; otherwise it gets
 //! none.
-#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, missing_docs)]
+use super::{Arguments, BenchmarkResult};
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::checked::Positive;
 use manifactor_quadric::{BoundingBox, Camera};
@@ -76,8 +76,8 @@ fn still(labels: &BTreeMap<usize, Vec<Label>>, poses: &[Se3]) -> Vec<u32> {
     places.into_iter().filter(|(_, places)| is_still(places)).map(|(track, _)| track).collect()
 }
 
-fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+pub(super) fn run(arguments: Arguments) -> BenchmarkResult {
+    let arguments: Vec<String> = arguments.collect();
     let [folder, sequence, out] = arguments.as_slice() else { panic!("kitti FOLDER SEQUENCE OUT") };
     let read = |kind: &str| {
         std::fs::read_to_string(Path::new(folder).join(kind).join(format!("{sequence}.txt"))).unwrap()
@@ -117,4 +117,5 @@ fn main() {
         recorded.detections.len(),
         still.len()
     );
+    Ok(())
 }

@@ -1,8 +1,8 @@
 //! A run's sequence frame by frame, compared with the batch: latencies, gaps, trajectories.
 //!
-//! `stream RUN.toml [--data FOLDER] [--variant NAME] [--gap N] [KEY=VALUE…]`; times are wall-clock times of
-//! one thread.
-#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
+//! `measure stream RUN.toml [--data FOLDER] [--variant NAME] [--gap N] [KEY=VALUE…]`; times are
+//! wall-clock times of one thread.
+use super::{Arguments, BenchmarkResult};
 use manifactor_config::Document;
 use manifactor_formats::replay::Latencies;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
@@ -58,10 +58,9 @@ impl StreamWatcher for Gaps {
     }
 }
 
-fn main() {
+pub(super) fn run(mut arguments: Arguments) -> BenchmarkResult {
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global().unwrap();
     let (mut config, mut data, mut name, mut every, mut sets) = (None, None, None, 0, vec![]);
-    let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--data" => data = arguments.next(),
@@ -92,6 +91,7 @@ fn main() {
             println!("  {:.1} ms at {frame}: {what}", 1e3 * seconds);
         }
     }
+    Ok(())
 }
 
 /// Prints the latencies of the stream, and its result next to that of the batch.

@@ -1,6 +1,6 @@
 //! Time to linearize a bounding-box factor, analytically and by automatic differentiation:
-//! `cargo run --release -p manifactor-bench --example linearise_boxes`
-#![allow(clippy::print_stdout)]
+//! `cargo run --release -p manifactor-bench -- measure linearise_boxes`
+use super::BenchmarkResult;
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::{Residual, Variables};
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
@@ -39,7 +39,7 @@ fn time(views: &[(Se3, DualQuadric)], mut run: impl FnMut(&Se3, &DualQuadric)) -
     (0..7).map(|_| round(&mut run)).fold(f64::INFINITY, f64::min)
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(super) fn run() -> BenchmarkResult {
     let views = scene();
     println!("{} boxes, ns each", views.len());
     println!("{:<10} {:>10} {:>10} {:>10} {:>10}", "model", "defined?", "residual", "analytic", "autodiff");

@@ -1,12 +1,12 @@
 //! Memory and time of a robot that drives through streets for hours.
 //!
-//! `cargo run --release -p manifactor-bench --example long -- [--poses N] [--step METRES] [--seconds S]
+//! `cargo run --release -p manifactor-bench -- measure long [--poses N] [--step METRES] [--seconds S]
 //! [--seed N]`. Streets cross every ten metres, twenty in each direction. At each crossing the robot turns
 //! in a random direction. It makes ten poses per second, one for each step. At a crossing that it has
 //! visited before, a factor closes the loop to the pose of its last visit. `--seconds` sets a window; loop
 //! closures to marginalized poses are left out. Prints one row for each tenth of the way. Times are CPU
 //! times of one thread in milliseconds.
-#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
+use super::{Arguments, BenchmarkResult, cpu_seconds, resident};
 use manifactor_formats::replay::Latencies;
 use manifactor_geometry::{Between, Se2, So2};
 use manifactor_graph::checked::Positive;
@@ -27,18 +27,6 @@ const STREETS: i32 = 20;
 /// its length), and of a loop closure.
 const ODOMETRY: [f64; 3] = [0.05, 0.05, 0.01];
 const CLOSURE: [f64; 3] = [0.1, 0.1, 0.02];
-
-fn cpu_seconds() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
-
-/// Resident memory of the process, on systems that report it. Unit: megabytes.
-fn resident() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
-    line.and_then(|line| line.trim().trim_end_matches(" kB").parse::<f64>().ok()).unwrap_or_default() / 1e3
-}
 
 /// The true motion of the robot.
 struct Robot {
@@ -97,9 +85,8 @@ impl Robot {
     }
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(super) fn run(mut arguments: Arguments) -> BenchmarkResult {
     let (mut poses, mut step, mut seed, mut window) = (100_000_usize, 1.0_f64, 1, None);
-    let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let value = arguments.next().ok_or(format!("{argument} takes a number"))?;
         match argument.as_str() {
