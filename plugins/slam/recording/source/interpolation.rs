@@ -18,6 +18,9 @@ pub enum NoPose {
     Gap(f64),
 }
 
+/// Sources write timestamps with microseconds, so that equal gaps differ by this much. Unit: seconds.
+const TIME_ROUNDING_S: f64 = 2e-6;
+
 /// Returns the pose at a time, interpolated on SE(3) between neighbours that are at most `max_gap` seconds
 /// apart. `poses` are sorted by time.
 ///
@@ -31,7 +34,7 @@ pub(super) fn pose_at(poses: &[StampedPose], timestamp: f64, max_gap: f64) -> Re
     }
     let from = after.checked_sub(1).and_then(|before| poses.get(before)).ok_or(NoPose::Before)?;
     let gap = to.timestamp - from.timestamp;
-    if gap > max_gap {
+    if gap > max_gap + TIME_ROUNDING_S {
         return Err(NoPose::Gap(gap));
     }
     Ok(from.interpolate(to, timestamp))
