@@ -166,7 +166,9 @@ fn a_window_that_holds_all_closures_is_as_good_as_all() {
             bytes.push(narrow.bytes());
         }
     }
-    assert_eq!((narrow.variables(), all.variables()), (120, 500));
+    // a window is longer by up to an eighth
+    assert!((120..=135).contains(&narrow.variables()), "{} variables", narrow.variables());
+    assert_eq!(all.variables(), 500);
     let [one, other] = [&narrow, &all].map(|session| session.covariance(&["x499"]).unwrap());
     assert!((&one - &other).norm() < 0.02 * other.norm(), "{one} {other}");
     let [one, batch]: [Se3; 2] = [&narrow, &all].map(|session| session.get("x499").unwrap());
