@@ -5,6 +5,7 @@ use manifactor_quadric::DualQuadric;
 use manifactor_recording::sequence::ObjectId;
 use nalgebra::DMatrix;
 use serde::Serialize;
+use std::array::from_fn;
 use std::collections::BTreeMap;
 
 /// An object is reported again if its estimate moves by this tangent length: 1 mm, 1 mrad, or 0.1 % of a
@@ -39,7 +40,7 @@ pub enum ObjectStatus {
         /// Covariance of the estimate in tangent order: rotation in rad and centre in m, both in the object's
         /// frame, then the logarithms of the semi-axes. `None` if a direction is undetermined.
         #[serde(skip_serializing_if = "Option::is_none")]
-        covariance: Option<Vec<Vec<f64>>>,
+        covariance: Option<[[f64; 9]; 9]>,
     },
     /// One object together with an earlier or a later one. This number is not used again.
     Merged {
@@ -85,10 +86,8 @@ impl ObjectUpdates {
                     state: match quadric {
                         Some(quadric) => {
                             let covariance = mapper.object_covariance(measured.id);
-                            let rows = |m: DMatrix<f64>| {
-                                m.row_iter().map(|row| row.iter().copied().collect()).collect()
-                            };
-                            ObjectStatus::Mapped { quadric, covariance: covariance.map(rows) }
+                            let entries = |m: DMatrix<f64>| from_fn(|r| from_fn(|c| m[(r, c)]));
+                            ObjectStatus::Mapped { quadric, covariance: covariance.map(entries) }
                         }
                         None => ObjectStatus::Tentative,
                     },

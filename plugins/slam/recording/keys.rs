@@ -22,6 +22,11 @@ pub fn key_number<'k>(key: &'k Key, prefix: &str) -> Option<&'k str> {
     is_number.then_some(number)
 }
 
+/// Returns whether a key is that of a pose or an object.
+pub fn is_pose_or_object(key: &Key) -> bool {
+    ["x", "q"].iter().any(|prefix| key_number(key, prefix).is_some())
+}
+
 /// Number of an object, shared by detections and ground truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]

@@ -215,6 +215,12 @@ pub enum SourceError {
         /// The reason.
         why: NoPose,
     },
+    /// Changes of the pose graph after the last image with a pose.
+    #[error("changes of the pose graph after the last image with a pose are left out: {changes}")]
+    ChangesWithoutImage {
+        /// Number of factors, removed factors and corrected poses.
+        changes: usize,
+    },
     /// A stream that can be read only once and has been read already.
     #[error("{} can be read once, and another variant has read it: run one variant, or give `file`", file.display())]
     ReadBefore {

@@ -1,22 +1,12 @@
 //! `docs/slam-systems.md`: its document maps a recording, and its line is a frame with a closure.
-use crate::{fed, folder, manifactor, path, root};
+use super::block;
+use crate::{fed, folder, manifactor, path};
 
 const CAMERA: &str = "camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
 
-/// Returns the first block of `language` in the page that contains `text`.
-fn block(language: &str, text: &str) -> String {
-    let page = std::fs::read_to_string(root().join("docs/slam-systems.md")).unwrap();
-    let opening = format!("```{language}\n");
-    let mut blocks = page.split(&opening).skip(1).filter_map(|rest| rest.split("```").next());
-    blocks
-        .find(|block| block.contains(text))
-        .unwrap_or_else(|| panic!("no {language} with {text}"))
-        .to_owned()
-}
-
 #[test]
 fn a_trajectory_of_another_program_is_mapped() {
-    let document = block("toml", "CameraTrajectory.txt");
+    let document = block("slam-systems.md", "toml", "CameraTrajectory.txt");
     let camera = document.lines().find(|line| line.starts_with("camera =")).unwrap();
     let folder = folder(&[("office.toml", &document.replace(camera, CAMERA))]);
     let (office, recording) = (path(&folder, "office.toml"), path(&folder, "office"));
@@ -35,7 +25,7 @@ fn a_trajectory_of_another_program_is_mapped() {
 
 #[test]
 fn a_line_with_a_closure_is_a_frame() {
-    let line = block("json", "loop 3");
+    let line = block("slam-systems.md", "json", "loop 3");
     let live = format!("source = {{ type = \"json_lines\", up = [0, -1, 0], {CAMERA} }}");
     let folder = folder(&[("live.toml", &live)]);
     let first =

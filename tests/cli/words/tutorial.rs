@@ -1,20 +1,10 @@
 //! `docs/tutorial.md`, followed by a user with different data: class names, camera, and labels as fractions
 //! of the image.
+use super::block;
 use crate::{manifactor, root};
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
-
-/// Returns the first block of `language` in the tutorial that contains `text`.
-fn block(language: &str, text: &str) -> String {
-    let page = std::fs::read_to_string(root().join("docs/tutorial.md")).unwrap();
-    let opening = format!("```{language}\n");
-    let mut blocks = page.split(&opening).skip(1).filter_map(|rest| rest.split("```").next());
-    blocks
-        .find(|block| block.contains(text))
-        .unwrap_or_else(|| panic!("no {language} with `{text}`"))
-        .to_owned()
-}
 
 const CAMERA: &str = "{ fx = 500.0, fy = 510.0, cx = 400.0, cy = 310.0, width = 800, height = 600 }";
 
@@ -73,7 +63,11 @@ fn the_tutorial_maps_the_objects_of_another_camera() {
 
     let classes = write_labels(&simulation.join("detections.csv"), &folder.path().join("labels"));
     std::fs::write(folder.path().join("classes.txt"), classes.join("\n")).unwrap();
-    std::fs::write(folder.path().join("labels_to_csv.py"), block("python", "labels_to_csv.py")).unwrap();
+    std::fs::write(
+        folder.path().join("labels_to_csv.py"),
+        block("tutorial.md", "python", "labels_to_csv.py"),
+    )
+    .unwrap();
     let mut python = Command::new("python3");
     let Ok(converted) = python
         .args(["labels_to_csv.py", "labels", "classes.txt", "800", "600"])
@@ -86,11 +80,11 @@ fn the_tutorial_maps_the_objects_of_another_camera() {
     assert!(converted.status.success(), "{}", String::from_utf8_lossy(&converted.stderr));
     std::fs::write(recording.join("detections.csv"), converted.stdout).unwrap();
 
-    let settings = block("toml", "recording");
+    let settings = block("tutorial.md", "toml", "recording");
     let written = "{ fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
     assert!(settings.contains(written));
     std::fs::write(robot.join("robot.toml"), settings.replace(written, CAMERA)).unwrap();
-    let steps = block("sh", "manifactor check");
+    let steps = block("tutorial.md", "sh", "manifactor check");
     for command in steps.lines().filter_map(|line| line.strip_prefix("manifactor ")) {
         let mut binary = Command::new(env!("CARGO_BIN_EXE_manifactor"));
         let output = binary.args(command.split_whitespace()).current_dir(&robot).output().unwrap();

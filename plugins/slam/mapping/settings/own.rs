@@ -1,6 +1,6 @@
 use manifactor_config::{Fault, Section, read_graph_section};
 use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Values, Variable};
-use manifactor_recording::keys::key_number;
+use manifactor_recording::keys::{is_pose_or_object, key_number};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
@@ -22,7 +22,7 @@ impl OwnGraph {
             return Self::default();
         }
         let (graph, values) = read_graph_section(section);
-        for (key, _) in values.iter().filter(|(key, _)| is_of_the_map(key)) {
+        for (key, _) in values.iter().filter(|(key, _)| is_pose_or_object(key)) {
             let message = format!("`{key}` is the key of a pose or an object");
             let help = "x0, x1, … are the poses and q0, q1, … the objects of a run: choose another name";
             section.report("variables", Fault::with_help(message, help));
@@ -49,10 +49,6 @@ impl OwnGraph {
         }
         graph.factors_mut().extend(self.graph.factors().iter().cloned());
     }
-}
-
-fn is_of_the_map(key: &Key) -> bool {
-    ["x", "q"].iter().any(|prefix| key_number(key, prefix).is_some())
 }
 
 /// Writes the form of a document; empty lists are left out.

@@ -1,7 +1,7 @@
 //! Factors on poses besides odometry, and corrected odometry of earlier frames.
-use super::Mapper;
 use super::frame::FrameReport;
 use super::object::ObjectState;
+use super::{FrameError, Mapper};
 use manifactor_formats::tum::StampedPose;
 use manifactor_graph::{FactorEntry, Graph, Key, Manifold, Values, Variable};
 use manifactor_mapping::mapping::{motion_step, object_key, pose_key, prior_entry};
@@ -33,22 +33,7 @@ impl Mapper {
         if unknown.len() == corrected.len() {
             return;
         }
-        self.move_estimates(&before);
-        match self.replace_odometry(&before) {
-            Ok(outside) => {
-                if outside > 0 {
-                    report.refused.push(format!(
-                        "corrections of {outside} steps before the window count in the final map only"
-                    ));
-                }
-            }
-            Err(why) => {
-                self.frames = before;
-                report.refused.push(format!("the corrected poses: {why}"));
-                return;
-            }
-        }
-        if let Err(why) = self.update_until_settled(report) {
+        if let Err(why) = self.apply_corrections(&before, report) {
             self.frames = before;
             report.refused.push(format!("the corrected poses: {why}"));
             return;
@@ -60,6 +45,19 @@ impl Mapper {
         for id in self.objects.iter().filter_map(is_tentative).collect::<Vec<_>>() {
             self.objects.insert(id, ObjectState::Tentative(self.viewing_directions(id)));
         }
+    }
+
+    /// Replaces the odometry that differs from `before`, moves the estimates with it, and updates the smoother.
+    fn apply_corrections(&mut self, before: &[Frame], report: &mut FrameReport) -> Result<(), FrameError> {
+        // nothing is pushed to the smoother before all factors exist
+        let outside = self.replace_odometry(self.changed_entries(before)?)?;
+        if outside > 0 {
+            report.refused.push(format!(
+                "corrections of {outside} steps before the window count in the final map only"
+            ));
+        }
+        self.move_estimates(before);
+        Ok(self.update_until_settled(report)?)
     }
 
     /// Updates the smoother until the cost no longer decreases much. The first error is returned; after it, nothing
@@ -107,10 +105,8 @@ impl Mapper {
         }
     }
 
-    /// Replaces the factors of steps whose odometry differs from `before`. Returns the number of steps that
-    /// are not in the smoother any more.
-    fn replace_odometry(&mut self, before: &[Frame]) -> Result<usize, String> {
-        let entries = self.changed_entries(before).map_err(|error| error.to_string())?;
+    /// Replaces factors of the odometry. Returns the number of those that are not in the smoother any more.
+    fn replace_odometry(&mut self, entries: Vec<FactorEntry>) -> Result<usize, ChangeError> {
         let (graph, ids) = self.smoother.graph();
         let name = |entry: &FactorEntry| (entry.keys.clone(), entry.factor.typetag_name());
         let unnamed = graph.factors().iter().zip(ids).filter(|(entry, _)| entry.name.is_none());
@@ -119,7 +115,7 @@ impl Mapper {
         let mut outside = 0;
         for entry in entries {
             match by_keys.get(&name(&entry)) {
-                Some(id) => self.smoother.replace(*id, entry).map_err(|error| error.to_string())?,
+                Some(id) => self.smoother.replace(*id, entry)?,
                 None => outside += 1,
             }
         }

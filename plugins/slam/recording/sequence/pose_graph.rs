@@ -1,7 +1,7 @@
 //! Measurements of poses besides odometry: loop closures, positions from satellites, markers, and corrected
 //! poses of the SLAM system that provides the odometry.
 use super::Frame;
-use crate::keys::{key_number, pose_key};
+use crate::keys::{is_pose_or_object, pose_key};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::loss::Loss;
@@ -67,7 +67,7 @@ pub enum PoseGraphError {
         /// Timestamp of the nearest frame, if there is any frame.
         nearest: Option<f64>,
     },
-    /// A factor on an object.
+    /// The key of a pose or an object.
     #[error(
         "`{key}` may not be named here, because the numbers of poses and objects can change: give the timestamp of a \
          frame, or the key of a variable of the document"
@@ -91,13 +91,6 @@ fn nearest_frame(timestamp: Option<f64>) -> String {
     timestamp.map_or(String::new(), |at| format!(" (the nearest is at {at} s)"))
 }
 
-impl PoseGraphChanges {
-    /// Returns whether there is no change.
-    pub fn is_empty(&self) -> bool {
-        self.factors.is_empty() && self.removed.is_empty() && self.corrected.is_empty()
-    }
-}
-
 impl PoseFactor {
     /// Returns the factor between the poses of `frames` and other variables.
     ///
@@ -106,7 +99,7 @@ impl PoseFactor {
     pub fn entry(&self, frames: &[Frame]) -> Result<FactorEntry, PoseGraphError> {
         let key = |key: &PoseFactorKey| match key {
             PoseFactorKey::Timestamp(timestamp) => frame_at(frames, *timestamp).map(pose_key),
-            PoseFactorKey::Key(key) if ["x", "q", "v"].iter().any(|p| key_number(key, p).is_some()) => {
+            PoseFactorKey::Key(key) if is_pose_or_object(key) => {
                 Err(PoseGraphError::NumberedKey { key: key.clone() })
             }
             PoseFactorKey::Key(key) => Ok(key.clone()),

@@ -49,7 +49,7 @@ pub(super) struct PoseOrImage {
     pub is_image: bool,
 }
 
-/// An image may arrive this long after its time, in seconds.
+/// An image may arrive this long after its time, and waits this long for a pose, in seconds.
 const MAX_DELAY_S: f64 = 10.0;
 
 /// Frames with interpolated poses. An image waits for the first pose after it. A pose without an image adds no
@@ -98,22 +98,29 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
                 Some(before) => before.pose = pose,
                 None => self.poses.insert(place, StampedPose { timestamp, pose }),
             }
+            // a later pose had a wrong timestamp, with which all images would seem to lie in a gap
+            let late = self.poses.partition_point(|pose| pose.timestamp <= timestamp + MAX_DELAY_S);
+            self.poses.truncate(late);
         }
-        let PoseGraphChanges { factors, removed, corrected } = &mut observation.pose_graph;
-        self.pose_graph.corrected.append(corrected);
+        self.pose_graph.corrected.append(&mut observation.pose_graph.corrected);
         if is_image {
             let place = self.images.partition_point(|before| before.frame.timestamp <= timestamp);
             self.images.insert(place, observation);
         } else {
-            self.pose_graph.factors.append(factors);
-            self.pose_graph.removed.append(removed);
-            self.accelerometer.append(&mut observation.accelerometer);
-            self.unused.append(&mut observation.unused);
+            self.keep_for_next(observation);
         }
         self.release(false);
         let oldest = self.images.first().map_or(timestamp, |image| image.frame.timestamp.min(timestamp));
         let old = self.poses.partition_point(|pose| pose.timestamp < oldest - MAX_DELAY_S);
         self.poses.drain(..old);
+    }
+
+    /// Keeps the data of a line that becomes no frame.
+    fn keep_for_next(&mut self, mut line: Observation) {
+        self.pose_graph.factors.append(&mut line.pose_graph.factors);
+        self.pose_graph.removed.append(&mut line.pose_graph.removed);
+        self.accelerometer.append(&mut line.accelerometer);
+        self.unused.append(&mut line.unused);
     }
 
     /// Moves the poses so far to the corrected odometry frame of the next ones.
@@ -130,13 +137,16 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
         }
     }
 
-    /// Releases the images that a pose follows; at the end, all. The first one gets the corrections that have
-    /// arrived, the last one the factors.
+    /// Releases the images that a pose follows, and images for which none has come; at the end, all. The first
+    /// one gets the corrections that have arrived, the last one the factors.
     fn release(&mut self, is_end: bool) {
         let last = self.poses.last().map_or(f64::NEG_INFINITY, |pose| pose.timestamp);
-        let ready = self.images.partition_point(|image| is_end || image.frame.timestamp <= last);
+        // the newest image may have a wrong timestamp
+        let newest = self.images.iter().nth_back(1).map_or(last, |image| image.frame.timestamp);
+        let until = last.max(newest - MAX_DELAY_S);
+        let ready = self.images.partition_point(|image| is_end || image.frame.timestamp <= until);
         let mut released = vec![];
-        for mut image in self.images.drain(..ready) {
+        for mut image in self.images.drain(..ready).collect::<Vec<_>>() {
             let timestamp = image.frame.timestamp;
             match pose_at(&self.poses, timestamp, self.max_gap) {
                 Ok(pose) => {
@@ -145,6 +155,7 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
                 }
                 Err(why) => {
                     let boxes = image.detections.len();
+                    self.keep_for_next(image);
                     released.push(Err(SourceError::ImageWithoutPose { timestamp, boxes, why }));
                 }
             }
@@ -173,8 +184,13 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> Iterator for Interpol
             match self.read.next() {
                 Some(Ok(read)) => self.add(read),
                 Some(Err(error)) => return Some(Err(error)),
-                None if self.images.is_empty() => return None,
-                None => self.release(true),
+                None if !self.images.is_empty() => self.release(true),
+                None => {
+                    let PoseGraphChanges { factors, removed, corrected } =
+                        std::mem::take(&mut self.pose_graph);
+                    let changes = factors.len() + removed.len() + corrected.len();
+                    return (changes > 0).then_some(Err(SourceError::ChangesWithoutImage { changes }));
+                }
             }
         }
     }
@@ -241,5 +257,50 @@ mod tests {
             .collect();
         let expected = ["0.5 Before", "1.25 1.25 2", "1.5 1.5 0", "1.75 1.75 0", "3 Gap(3.0)", "6 After"];
         assert_eq!(found, expected);
+    }
+
+    /// Returns the timestamps of frames, and of images without a pose as negative numbers.
+    fn timestamps(read: impl IntoIterator<Item = Result<PoseOrImage, SourceError>>) -> Vec<f64> {
+        let timestamp = |frame| match frame {
+            Ok(Observation { frame, .. }) => frame.timestamp,
+            Err(SourceError::ImageWithoutPose { timestamp, .. }) => -timestamp,
+            Err(error) => panic!("{error}"),
+        };
+        InterpolatedFrames::new(read.into_iter(), 1.0).map(timestamp).collect()
+    }
+
+    #[test]
+    fn images_do_not_wait_for_ever_for_a_pose() {
+        let mut frames = InterpolatedFrames::new((0..).map(|i| image(f64::from(i))), 1.0);
+        let first = frames.next().unwrap();
+        assert!(matches!(first, Err(SourceError::ImageWithoutPose { timestamp: 0.0, .. })));
+        assert_eq!(frames.images.len(), 11);
+    }
+
+    #[test]
+    fn one_wrong_timestamp_costs_few_images() {
+        let with = |wrong: Result<PoseOrImage, SourceError>| {
+            let (before, after) =
+                ([pose(1.0), image(1.5)], [pose(2.0), image(2.5), pose(3.0), image(3.5), pose(4.0)]);
+            timestamps(before.into_iter().chain([wrong]).chain(after))
+        };
+        assert_eq!(with(pose(1e300)), [-1.5, 2.5, 3.5]);
+        assert_eq!(with(image(1e300)), [1.5, 2.5, 3.5, -1e300]);
+    }
+
+    #[test]
+    fn changes_of_an_image_without_a_pose_are_kept_and_those_after_the_last_image_reported() {
+        let with_removed = |read: Result<PoseOrImage, SourceError>, id: &str| {
+            let mut read = read.unwrap();
+            read.observation.pose_graph.removed.push(id.into());
+            Ok(read)
+        };
+        let read =
+            [with_removed(image(0.5), "a"), pose(1.0), image(1.5), pose(2.0), with_removed(pose(3.0), "b")];
+        let frames: Vec<_> = InterpolatedFrames::new(read.into_iter(), 1.0).collect();
+        assert!(matches!(frames[0], Err(SourceError::ImageWithoutPose { .. })));
+        assert_eq!(frames[1].as_ref().unwrap().pose_graph.removed, ["a"]);
+        assert!(matches!(frames[2], Err(SourceError::ChangesWithoutImage { changes: 1 })));
+        assert_eq!(frames.len(), 3);
     }
 }

@@ -40,7 +40,8 @@ impl FrameStream {
         }
     }
 
-    /// Waits for the last frame and returns all frames. Images without a pose become unused input.
+    /// Waits for the last frame and returns all frames. Images without a pose, and changes after the last one, become
+    /// unused input.
     ///
     /// # Errors
     /// The first other error.
@@ -48,9 +49,13 @@ impl FrameStream {
         let mut all = self.opening.into_sequence();
         for observation in OrderedFrames::new(self.observations) {
             match observation {
-                Err(SourceError::ImageWithoutPose { timestamp, boxes, why }) => {
-                    let fault = SourceError::ImageWithoutPose { timestamp, boxes, why }.to_string();
-                    all.unused.push(UnusedInput::Image { boxes, fault });
+                Err(error @ SourceError::ImageWithoutPose { boxes, .. }) => {
+                    all.unused.push(UnusedInput::Image { boxes, fault: error.to_string() });
+                }
+                Err(error @ SourceError::ChangesWithoutImage { .. }) => {
+                    let timestamp = all.frames.last().map_or(0.0, |frame| frame.timestamp);
+                    let (field, fault) = ("after the last image".into(), error.to_string());
+                    all.unused.push(UnusedInput::PoseGraph { timestamp, field, fault });
                 }
                 observation => all.push(observation?),
             }
