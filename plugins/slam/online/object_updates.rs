@@ -40,7 +40,7 @@ pub enum ObjectStatus {
         /// Covariance of the estimate in tangent order: rotation in rad and centre in m, both in the object's
         /// frame, then the logarithms of the semi-axes. `None` if a direction is undetermined.
         #[serde(skip_serializing_if = "Option::is_none")]
-        covariance: Option<[[f64; 9]; 9]>,
+        covariance: Option<Box<[[f64; 9]; 9]>>,
     },
     /// One object together with an earlier or a later one. This number is not used again.
     Merged {
@@ -86,7 +86,7 @@ impl ObjectUpdates {
                     state: match quadric {
                         Some(quadric) => {
                             let covariance = mapper.object_covariance(measured.id);
-                            let entries = |m: DMatrix<f64>| from_fn(|r| from_fn(|c| m[(r, c)]));
+                            let entries = |m: DMatrix<f64>| Box::new(from_fn(|r| from_fn(|c| m[(r, c)])));
                             ObjectStatus::Mapped { quadric, covariance: covariance.map(entries) }
                         }
                         None => ObjectStatus::Tentative,

@@ -1,7 +1,7 @@
 //! `docs/tutorial.md`, followed by a user with different data: class names, camera, and labels as fractions
 //! of the image.
 use super::block;
-use crate::{manifactor, root};
+use crate::manifactor;
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
