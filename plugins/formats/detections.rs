@@ -51,6 +51,8 @@ pub struct DetectionRow {
 }
 
 const REQUIRED: [&str; 7] = ["timestamp", "class_name", "score", "xmin", "ymin", "xmax", "ymax"];
+const OPTIONAL: [&str; 6] =
+    ["frame_idx", "frame_idx_as_published", "object_key", "class_id", "scores", "depth"];
 
 impl DetectionRow {
     /// Returns the classes with their scores: all of `scores`, otherwise the best alone. Empty for a box
@@ -118,10 +120,12 @@ pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<DetectionRow>, Fo
     let mut problems = ProblemList::of(path.as_ref(), text);
     let mut reader = ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
     let header = reader.headers().cloned().unwrap_or_default();
-    let missing: Vec<_> = REQUIRED.into_iter().filter(|name| header.iter().all(|h| h != *name)).collect();
-    if !missing.is_empty() {
+    let mistakes = header_mistakes(&header);
+    if !mistakes.is_empty() {
         let line = header.position().map_or(1, |p| p.line() as usize);
-        problems.push(line, Mistake::Row(missing_columns(&missing, &header)));
+        for mistake in mistakes {
+            problems.push(line, Mistake::Row(mistake));
+        }
         return problems.finish().map(|()| vec![]);
     }
     let mut rows = vec![];
@@ -150,6 +154,30 @@ const OTHER_NAMES: &[(&str, &[&str])] = &[
     ("xmax", &["x2", "right"]),
     ("ymax", &["y2", "bottom"]),
 ];
+
+/// Names of the columns in which trackers write their ids.
+const TRACK_IDS: [&str; 6] = ["track_id", "trackid", "tracker_id", "track", "object_id", "id"];
+
+/// Describes the missing and the unknown columns of a header.
+fn header_mistakes(header: &StringRecord) -> Vec<String> {
+    let missing: Vec<_> = REQUIRED.into_iter().filter(|name| header.iter().all(|h| h != *name)).collect();
+    if !missing.is_empty() {
+        return vec![missing_columns(&missing, header)];
+    }
+    let is_known = |name: &str| REQUIRED.contains(&name) || OPTIONAL.contains(&name);
+    header.iter().filter(|name| !is_known(name)).map(unknown_column).collect()
+}
+
+fn unknown_column(name: &str) -> String {
+    let remedy = if TRACK_IDS.contains(&name.to_ascii_lowercase().as_str()) {
+        "remove it, and data association finds the objects; if each object keeps its id in the whole recording, \
+         rename the column to `object_key`"
+            .to_owned()
+    } else {
+        format!("expected {}, and optionally {}", REQUIRED.join(", "), OPTIONAL.join(", "))
+    };
+    format!("the header has an unknown column `{name}`: {remedy}")
+}
 
 /// Names the missing columns, each with the column of the header that has probably the same meaning.
 fn missing_columns(missing: &[&str], header: &StringRecord) -> String {
@@ -251,8 +279,28 @@ mod tests {
 
     #[test]
     fn an_unknown_column_is_an_error() {
-        let text = format!("colour,{HEADER}red,1,cup,1,0,0,1,1,1");
-        assert!(parse(&text, "d.csv").unwrap_err().to_string().contains("unknown field `colour`"));
+        let rows = "red,1,cup,1,0,0,1,1,1\n".repeat(3);
+        let text = parse(&format!("colour,{HEADER}{rows}"), "d.csv").unwrap_err().to_string();
+        assert_eq!(
+            text,
+            "d.csv:1: the header has an unknown column `colour`: expected timestamp, class_name, score, xmin, ymin, \
+             xmax, ymax, and optionally frame_idx, frame_idx_as_published, object_key, class_id, scores, depth"
+        );
+        let text = parse(&format!("Track_ID,{HEADER}{rows}"), "d.csv").unwrap_err().to_string();
+        assert!(text.contains("rename the column to `object_key`"), "{text}");
+    }
+
+    #[test]
+    fn the_lists_have_all_columns_of_a_row() {
+        let row = parse(&format!("{HEADER}1,cup,0.5,1,2,3,4,7\n"), "d.csv").unwrap().remove(0);
+        let mut writer = Writer::from_writer(vec![]);
+        writer.serialize(row).unwrap();
+        let text = String::from_utf8(writer.into_inner().unwrap()).unwrap();
+        let mut written: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        let mut listed = [&REQUIRED[..], &OPTIONAL[..]].concat();
+        written.sort_unstable();
+        listed.sort_unstable();
+        assert_eq!(written, listed);
     }
 
     #[test]
