@@ -31,6 +31,11 @@ pub struct MotionComponent {
 pub struct MotionChoice {
     /// Noise in the graph: almost zero if the odometry is kept.
     pub noise: MotionComponent,
+    /// Smallest noise with a score within one standard error of the best, for data that are too few for the
+    /// best noise (the rule of Breiman et al., *Classification and Regression Trees*, 1984). Almost zero if the
+    /// odometry is kept.
+    #[serde(skip)]
+    pub(super) smallest_noise: MotionComponent,
     /// Score of the best noise. The odometry is kept unless the score is significant.
     pub score: CrossValidationScore,
     #[serde(skip)]
@@ -73,6 +78,7 @@ impl MotionChoice {
     pub(super) fn initial() -> Self {
         Self {
             noise: component(SEARCH_START, 0.0),
+            smallest_noise: component(SEARCH_START, 0.0),
             score: CrossValidationScore { cost: 0.0, deviation: 0.0 },
             place: SEARCH_START,
         }
@@ -150,6 +156,17 @@ impl GridSearch<'_> {
     }
 }
 
+/// Returns the smallest noise with a score within one standard error of the best one.
+fn smallest(
+    scores: &BTreeMap<GridPoint, CrossValidationScore>,
+    best: &CrossValidationScore,
+) -> Option<GridPoint> {
+    let close = scores.iter().filter(|(_, score)| score.cost <= best.cost + best.deviation);
+    let size = |(turn, shift, _): &GridPoint| turn + shift;
+    let smallest = close.min_by(|a, b| size(a.0).cmp(&size(b.0)).then(a.1.cost.total_cmp(&b.1.cost)));
+    smallest.map(|(place, _)| *place)
+}
+
 /// Returns the median distance of objects from the camera over all boxes, in metres.
 pub(super) fn median_distance(estimate: &Estimate) -> f64 {
     let (values, measurements) = (&estimate.solution.values, &estimate.mapping.measurements);
@@ -183,8 +200,11 @@ pub(super) fn choose_noise(
     }
     search.descend(1)?;
     let chosen = search.best().map(|(place, score)| {
-        let noise = if score.is_better() { component(place, pivot) } else { MotionComponent::UNCHANGED };
-        MotionChoice { noise, score, place }
+        let noise_at = |place: GridPoint| {
+            if score.is_better() { component(place, pivot) } else { MotionComponent::UNCHANGED }
+        };
+        let smallest = smallest(&search.scores, &score).unwrap_or(place);
+        MotionChoice { noise: noise_at(place), smallest_noise: noise_at(smallest), score, place }
     });
     Ok(chosen)
 }
@@ -204,6 +224,21 @@ mod tests {
         assert!(choice(GRID_LIMITS[1], -9.0).is_at_limit());
         assert!(!choice(GRID_LIMITS[1] - 1, -9.0).is_at_limit());
         assert!(!choice(GRID_LIMITS[1], 9.0).is_at_limit(), "the odometry is kept");
+    }
+
+    #[test]
+    fn the_smallest_noise_is_as_good_as_the_best_within_its_error() {
+        let score = |cost| CrossValidationScore { cost, deviation: 10.0 };
+        let scores = BTreeMap::from([
+            ((0, 0, false), score(-100.0)),
+            ((-1, 0, true), score(-95.0)),
+            ((0, -1, false), score(-96.0)),
+            ((-2, -2, false), score(-89.0)),
+            ((2, 2, false), score(-99.0)),
+        ]);
+        // of two equally small ones, the better
+        assert_eq!(smallest(&scores, &score(-100.0)), Some((0, -1, false)));
+        assert_eq!(smallest(&scores, &score(-98.0)), Some((-2, -2, false)));
     }
 
     #[test]

@@ -95,7 +95,7 @@ impl StreamNoise {
         if wants_odometry && found.odometry.is_none() {
             return Ok(None);
         }
-        let odometry = found.odometry.map(|choice| choice.noise);
+        let odometry = found.odometry.map(|choice| choice.smallest_noise);
         Ok(Some(Self::new(odometry, found.boxes.values().next().copied())?))
     }
 
