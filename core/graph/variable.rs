@@ -41,6 +41,8 @@ pub fn manifold_name(id: TypeId) -> &'static str {
 pub struct AsVariable {
     /// The type.
     pub type_id: fn() -> TypeId,
+    /// Dimension of its tangent space.
+    pub dimension: usize,
     /// Casts a variable; `None` if it has a different type.
     pub cast: for<'a> fn(&'a dyn Any) -> Option<&'a dyn Variable>,
 }

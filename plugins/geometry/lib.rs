@@ -25,8 +25,8 @@ pub use bundle::{
 };
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{
-    BearingRange2, BearingRange3, Between, ChordalBetween, ConstantVelocity, Landmark, Located, Position,
-    Prior, Range,
+    BearingRange2, BearingRange3, Between, ChordalBetween, ConstantVelocity, Landmark, Located, OnBody,
+    OnBodyError, Position, Prior, Range,
 };
 pub use groups::{
     AngleError, Coordinates, CoordinatesError, LieGroup, MatrixError, Point1, Point2, Point3, Rn,

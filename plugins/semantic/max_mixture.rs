@@ -1,5 +1,5 @@
 //! Mixtures: the best of several factors, for objects or data associations that are ambiguous.
-use manifactor_graph::catalogue::{self, Kind, Signature};
+use manifactor_graph::catalogue::Signature;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{
@@ -253,14 +253,9 @@ impl Mixture {
         }
         let known = |(place, id): (usize, Option<TypeId>)| id.ok_or(MixtureError::Unused { place });
         let types = types.into_iter().enumerate().map(known).collect::<Result<Vec<_>, _>>()?;
-        let manifolds = catalogue::entries(<dyn Variable as Kind>::NAME);
-        let dimension = |id: &TypeId| {
-            let entry = manifolds.iter().find(|entry| (entry.type_id)() == *id)?;
-            Some(((entry.signature)().tangent.len(), as_variable(*id)?))
-        };
-        let known: Option<Vec<_>> = types.iter().map(dimension).collect();
         // A registered factor uses only registered manifolds.
-        let (dimensions, casts) = known.unwrap_or_default().into_iter().unzip();
+        let casts: Vec<_> = types.iter().filter_map(|id| as_variable(*id)).collect();
+        let dimensions = casts.iter().map(|cast| cast.dimension).collect();
         let rows = parts.iter().filter_map(|part| part.factor.as_ref()).map(|of| of.whitening.nrows());
         let rows = 1 + rows.max().unwrap_or(0);
         Ok(Self { parts: parts.into(), types, dimensions, casts, rows })

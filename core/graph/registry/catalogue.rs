@@ -259,6 +259,7 @@ macro_rules! register_manifold {
             $crate::__private::inventory::submit! {
                 $crate::AsVariable {
                     type_id: || ::std::any::TypeId::of::<$type>(),
+                    dimension: <$type as $crate::Manifold>::TANGENT.len(),
                     cast: |x| x.downcast_ref::<$type>().map(|x| x as &dyn $crate::Variable),
                 }
             }

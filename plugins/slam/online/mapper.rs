@@ -52,6 +52,8 @@ pub struct Mapper {
     /// For the batch solve at the end.
     batch_settings: Arc<RunSettings>,
     camera: Camera,
+    /// For the poses of the body in reports.
+    camera_from_body: Option<Se3>,
     smoother: Smoother,
     up: UpEstimate,
     associator: Box<dyn Associator>,
@@ -147,6 +149,7 @@ impl Mapper {
             .filter_map(|measured| Some((measured.id, ObjectState::of_prior_object(measured)?)));
         Self {
             camera: opening.camera,
+            camera_from_body: opening.body_from_camera.map(|pose| pose.inverse()),
             smoother: Smoother::new(online),
             associator: settings.association.create_associator(opening.camera, &settings.aliases, &known),
             settings,
@@ -177,9 +180,15 @@ impl Mapper {
         self.apply_pose_factors(&observation.pose_graph, &mut report);
         let seen = seen?;
         self.update_objects(seen, &mut report);
-        report.pose = self.pose(report.frame).unwrap_or(report.pose);
+        self.report_pose(&mut report);
         self.live_poses.push(StampedPose { timestamp: report.timestamp, pose: report.pose });
         Ok(report)
+    }
+
+    /// Writes the current pose of a report's frame.
+    fn report_pose(&self, report: &mut FrameReport) {
+        report.pose = self.pose(report.frame).unwrap_or(report.pose);
+        report.body = self.camera_from_body.map(|body| report.pose.compose(&body));
     }
 
     /// Replaces the noise of all motions and boxes, of earlier frames and of those to come. The final solve
@@ -222,7 +231,7 @@ impl Mapper {
             }
         }
         self.update_objects(FrameBoxes::without_boxes(), &mut report);
-        report.pose = self.pose(report.frame).unwrap_or(report.pose);
+        self.report_pose(&mut report);
         report
     }
 

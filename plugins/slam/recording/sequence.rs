@@ -25,6 +25,8 @@ use pose_graph::{PoseFactor, PoseGraphChanges};
 pub struct Sequence {
     /// Camera, shared by all frames.
     pub camera: Camera,
+    /// Pose of the camera on the body whose odometry the source has. `None`: the odometry is that of the camera.
+    pub body_from_camera: Option<Se3>,
     /// Frames in strictly increasing order of time.
     pub frames: Vec<Frame>,
     /// Detections in the order of their frames.
@@ -121,6 +123,8 @@ impl fmt::Display for DetectionsWithoutPose {
 pub struct SequenceHeader {
     /// Camera, shared by all frames.
     pub camera: Camera,
+    /// Pose of the camera on the body whose odometry the source has. `None`: the odometry is that of the camera.
+    pub body_from_camera: Option<Se3>,
     /// Up direction in the odometry frame, if the source knows it.
     pub up: Option<Direction>,
     /// Ground truth to compare the estimate with.
@@ -145,14 +149,15 @@ pub struct Observation {
 impl SequenceHeader {
     /// Creates an opening with only a camera.
     pub fn new(camera: Camera) -> Self {
-        Self { camera, up: None, ground_truth: None }
+        Self { camera, body_from_camera: None, up: None, ground_truth: None }
     }
 
     /// Converts the opening to a sequence without frames.
     pub fn into_sequence(self) -> Sequence {
-        let Self { camera, up, ground_truth } = self;
+        let Self { camera, body_from_camera, up, ground_truth } = self;
         Sequence {
             camera,
+            body_from_camera,
             frames: vec![],
             detections: vec![],
             up,
@@ -173,7 +178,12 @@ impl AsRef<Self> for Sequence {
 impl Sequence {
     /// Returns the data that are known before the first frame.
     pub fn header(&self) -> SequenceHeader {
-        SequenceHeader { camera: self.camera, up: self.up, ground_truth: self.ground_truth.clone() }
+        SequenceHeader {
+            camera: self.camera,
+            body_from_camera: self.body_from_camera,
+            up: self.up,
+            ground_truth: self.ground_truth.clone(),
+        }
     }
 
     /// Returns the frames in order of arrival. A reading of the accelerometer belongs to the first frame at

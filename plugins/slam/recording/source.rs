@@ -7,9 +7,11 @@ use std::path::{Path, PathBuf};
 
 mod assemble;
 mod camera;
+mod extrinsics;
 mod interpolation;
 pub mod journal;
 mod json_lines;
+mod mcap;
 mod recorded;
 mod rectification;
 pub mod stream;
@@ -19,6 +21,7 @@ pub use camera::CameraChoice;
 pub use interpolation::NoPose;
 pub use json_lines::parse;
 pub use json_lines::{JsonLines, format_line};
+pub use mcap::{Mcap, McapError};
 pub use recorded::RecordedFiles;
 pub use rectification::Distortion;
 pub use stream::FrameStream;
@@ -242,6 +245,9 @@ pub enum SourceError {
         "`source.camera` is a model of its lens and `source.distortion` is another: leave one of them out"
     )]
     DistortedTwice,
+    /// A recording of ROS 2 without the needed data.
+    #[error(transparent)]
+    Mcap(#[from] McapError),
     /// A simulation that cannot be run.
     #[error("the simulation cannot be run: {0}")]
     Simulation(String),

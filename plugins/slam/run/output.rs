@@ -4,7 +4,8 @@
 //! folder with these files:
 //! - `config.toml`: all settings, ready to run again
 //! - `trajectory.txt`: the trajectory in TUM's format; `live.txt` for a stream, with each pose as estimated
-//!   when its frame arrived
+//!   when its frame arrived; `body_trajectory.txt` with the poses of the body, if the source has
+//!   `body_from_camera`
 //! - `detections.csv`: the boxes with their objects, if data association was done
 //! - `objects.json`: the objects
 //! - `frames.jsonl`: poses and boxes, one frame per line
@@ -132,6 +133,12 @@ pub fn write_variant(
     let file = |name: &str| folder.join(name);
     write_document(&file("config.toml"), resolved(run, variant))?;
     write_whole(&file("trajectory.txt"), tum::format(&estimate.trajectory()))?;
+    if let Some(body_from_camera) = estimate.sequence.body_from_camera {
+        let camera_from_body = body_from_camera.inverse();
+        let mut trajectory = estimate.trajectory();
+        trajectory.iter_mut().for_each(|stamped| stamped.pose = stamped.pose.compose(&camera_from_body));
+        write_whole(&file("body_trajectory.txt"), tum::format(&trajectory))?;
+    }
     if let Some(online) = &report.online {
         write_whole(&file("live.txt"), tum::format(&online.live))?;
     }

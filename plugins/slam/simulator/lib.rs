@@ -145,6 +145,7 @@ impl SimulatedSource {
         };
         Ok(Sequence {
             camera: self.camera,
+            body_from_camera: None,
             frames,
             detections,
             up: Some(Direction::Z),

@@ -111,6 +111,7 @@ fn lines(folder: &Path, bytes: &[u8]) -> Vec<Result<Observation, SourceError>> {
     let file = "frames.jsonl";
     std::fs::write(folder.join(file), bytes).unwrap_or_else(|e| panic!("{e}"));
     let source = JsonLines {
+        body_from_camera: None,
         camera: CameraChoice::Pinhole(camera()),
         file: Some(file.into()),
         ground_truth: None,

@@ -25,8 +25,11 @@ pub struct FrameReport {
     pub frame: usize,
     /// Unit: seconds.
     pub timestamp: f64,
-    /// The estimated pose in the map frame.
+    /// The estimated pose of the camera in the map frame.
     pub pose: Se3,
+    /// The estimated pose of the body in the map frame, if the source has `body_from_camera`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body: Option<Se3>,
     /// The start pose in the prior map, if this frame led to it. From now on ids and poses are those of the
     /// prior map. All frames were processed again, so objects, rejections and updates in this report cover
     /// all frames. Earlier reports refer to a map that was discarded.
@@ -89,6 +92,7 @@ impl FrameReport {
             frame,
             timestamp,
             pose: Se3::identity(),
+            body: None,
             located: None,
             noise: None,
             boxes: 0,

@@ -50,8 +50,7 @@ pub(super) fn is_default_share(share: &Share) -> bool {
     *share == default_share()
 }
 
-/// Reads odometry and detections. Each detection is assigned to the frame nearest in time; detections without
-/// a frame near enough are left out.
+/// Reads odometry and detections, and [matches](match_by_time) them.
 ///
 /// # Errors
 /// Files that cannot be read, or detections that all lack a frame.
@@ -60,57 +59,84 @@ pub(super) fn read_matched(
     file: &Path,
     by: TimeMatching,
 ) -> Result<MatchedDetections, SourceError> {
+    let poses = read_poses(odometry)?;
+    let rows = read_detections(file)?;
+    let images: Vec<f64> = rows.iter().map(|(timestamp, _)| *timestamp).collect();
+    match_by_time(&poses, images, rows, by, [file, odometry])
+}
+
+/// Reads detections with their timestamps.
+///
+/// # Errors
+/// A file that cannot be read.
+pub(super) fn read_detections(file: &Path) -> Result<Vec<(f64, Detection)>, SourceError> {
+    Ok(detections::read(file)?.iter().map(|row| (row.timestamp, detection(row))).collect())
+}
+
+/// Assigns each detection to the frame nearest in time. Frames are the poses, or the images with an interpolated
+/// pose. Detections without a frame near enough are left out. `from` names the origin of detections and poses.
+///
+/// # Errors
+/// Detections that all lack a frame.
+pub(super) fn match_by_time(
+    poses: &[StampedPose],
+    images: Vec<f64>,
+    rows: Vec<(f64, Detection)>,
+    by: TimeMatching,
+    from: [&Path; 2],
+) -> Result<MatchedDetections, SourceError> {
     let within = *by.within;
-    let (poses, rows) = (read_poses(odometry)?, detections::read(file)?);
     let frames: Vec<Frame> = match by.max_pose_gap {
-        Some(gap) => interpolated_frames(&poses, &rows, gap.get()),
+        Some(gap) => interpolated_frames(poses, images, gap.get()),
         None => poses.iter().map(|pose| Frame::new(pose.timestamp, pose.pose)).collect(),
     };
     let times: Vec<f64> = frames.iter().map(|frame| frame.timestamp).collect();
-    let mut matched = vec![];
-    for row in &rows {
-        if let Some((frame, _)) = nearest(&times, row.timestamp).filter(|(_, away)| *away <= within) {
-            matched.push(detection(frame, row)?);
-        }
-    }
-    if matched.is_empty() && !rows.is_empty() {
-        let (file, odometry) = (file.to_owned(), odometry.to_owned());
+    let count = rows.len();
+    let without = without_frame(&times, &rows, by);
+    let closest = || {
         let times: Vec<f64> = poses.iter().map(|pose| pose.timestamp).collect();
-        let away = |at: f64| nearest(&times, at).map(|(_, away)| (at, away));
-        let nearest = rows.iter().filter_map(|row| away(row.timestamp)).min_by(|a, b| a.1.total_cmp(&b.1));
-        let (within, setting) = by.limit();
+        let away = |(at, _): &(f64, Detection)| nearest(&times, *at).map(|(_, away)| (*at, away));
+        rows.iter().filter_map(away).min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let is_matched = |at: f64| nearest(&times, at).filter(|(_, away)| *away <= within);
+    if count > 0 && !rows.iter().any(|(at, _)| is_matched(*at).is_some()) {
+        let [file, odometry] = from.map(Path::to_owned);
+        let ((within, setting), nearest) = (by.limit(), closest());
         return Err(SourceError::NothingMatches {
             file,
             odometry,
-            detections: rows.len(),
+            detections: count,
             within,
             setting,
             nearest,
         });
     }
-    let without = without_frame(&times, &rows, by);
+    let matched = rows.into_iter().filter_map(|(at, detection)| {
+        let (frame, _) = is_matched(at)?;
+        Some(Detection { frame, ..detection })
+    });
+    let mut matched: Vec<Detection> = matched.collect();
     // stable, so that the order of the file decides between duplicates
     matched.sort_by_key(|detection| detection.frame);
     Ok((frames, matched, without.map(UnusedInput::WithoutPose).into_iter().collect()))
 }
 
-/// Returns a frame for each time with detections that lies between two poses.
-fn interpolated_frames(poses: &[StampedPose], rows: &[detections::DetectionRow], max_gap: f64) -> Vec<Frame> {
-    let mut timestamps: Vec<f64> = rows.iter().map(|row| row.timestamp).collect();
-    timestamps.sort_by(f64::total_cmp);
-    timestamps.dedup();
+/// Returns a frame for each image that lies between two poses.
+fn interpolated_frames(poses: &[StampedPose], mut images: Vec<f64>, max_gap: f64) -> Vec<Frame> {
+    images.sort_by(f64::total_cmp);
+    images.dedup();
     let frame = |timestamp: f64| Some(Frame::new(timestamp, pose_at(poses, timestamp, max_gap).ok()?));
-    timestamps.into_iter().filter_map(frame).collect()
+    images.into_iter().filter_map(frame).collect()
 }
 
 /// Returns a summary of the rows without a frame; `None` if there are none.
 fn without_frame(
     times: &[f64],
-    rows: &[detections::DetectionRow],
+    rows: &[(f64, Detection)],
     by: TimeMatching,
 ) -> Option<DetectionsWithoutPose> {
     let TimeMatching { within, without_pose: allowed, .. } = by;
-    let away = |row: &detections::DetectionRow| Some((row.timestamp, nearest(times, row.timestamp)?.1));
+    let away = |(at, _): &(f64, Detection)| Some((*at, nearest(times, *at)?.1));
     let far: Vec<(f64, f64)> = rows.iter().filter_map(away).filter(|(_, away)| *away > *within).collect();
     let nearest = far.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(DetectionsWithoutPose {
@@ -141,14 +167,14 @@ fn nearest(times: &[f64], timestamp: f64) -> Option<(usize, f64)> {
     away.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-fn detection(frame: usize, row: &detections::DetectionRow) -> Result<Detection, SourceError> {
+fn detection(row: &detections::DetectionRow) -> Detection {
     let scores: ClassScores = match row.class_scores() {
         Ok(scores) => scores.into_iter().collect(),
         // cannot happen: the reader has checked the scores
         Err(_) => ClassScores::single(row.class_name.clone(), row.score),
     };
-    Ok(Detection {
-        frame,
+    Detection {
+        frame: 0,
         object: row.object_key.filter(|key| *key != 0).map(ObjectId),
         scores,
         bounding_box: BoundingBox { xmin: row.xmin, ymin: row.ymin, xmax: row.xmax, ymax: row.ymax },
@@ -156,7 +182,7 @@ fn detection(frame: usize, row: &detections::DetectionRow) -> Result<Detection, 
             .depth
             .and_then(|depth| Positive::new(depth).ok())
             .map_or(Quantities::NONE, |depth| Quantities::one(DepthMeasurement(depth))),
-    })
+    }
 }
 
 /// Reads the true objects from the named file, or from the file that `simulate` writes, if it exists.

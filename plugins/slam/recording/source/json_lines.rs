@@ -1,10 +1,12 @@
 use super::assemble::read_ground_truth;
+use super::extrinsics::Extrinsics;
 use super::interpolation::{InterpolatedFrames, PoseOrImage};
 use super::rectification::Rectification;
 use super::stream::FrameStream;
 use super::{CameraChoice, InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::{Observation, Sequence, SequenceHeader};
 use manifactor_formats::FormatError;
+use manifactor_geometry::Se3;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
@@ -54,6 +56,11 @@ pub use line::{format_line, parse};
 pub struct JsonLines {
     /// The camera.
     pub camera: CameraChoice,
+    /// Pose of the camera in the frame of the body, if odometry, ground truth, `factors` and `corrected` are about poses of a body, such as a
+    /// robot: the translation in metres, and the rotation as a unit quaternion (x, y, z, w). The camera frame has x
+    /// to the right, y down and z forward. Default: they are poses of the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_from_camera: Option<Se3>,
     /// Path of the file, relative to the document. Default: standard input.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
@@ -107,9 +114,18 @@ register!(dyn SequenceSource, "json_lines", JsonLines);
 impl JsonLines {
     fn open_lines(&self, folders: &InputFolders) -> Result<FrameStream, SourceError> {
         let truth = self.ground_truth.as_deref().map(|file| read_ground_truth(&folders.document, Some(file)));
-        let ground_truth = truth.transpose()?.flatten();
+        let mut ground_truth = truth.transpose()?.flatten();
+        let extrinsics = self.body_from_camera.map(Extrinsics::new);
+        if let (Some(extrinsics), Some(truth)) = (extrinsics, &mut ground_truth) {
+            extrinsics.apply_to_ground_truth(truth);
+        }
         let lens = Rectification::new(&self.camera, None)?;
-        let opening = SequenceHeader { camera: lens.camera, up: self.up, ground_truth };
+        let opening = SequenceHeader {
+            camera: lens.camera,
+            body_from_camera: self.body_from_camera,
+            up: self.up,
+            ground_truth,
+        };
         let (file, reader): (_, Box<dyn BufRead + Send>) = match &self.file {
             Some(file) => {
                 let file = folders.beside_document(file);
@@ -124,6 +140,13 @@ impl JsonLines {
         };
         let needs_pose = self.max_pose_gap.is_none();
         let lines = FrameLines { file, reader, line: 0, text: vec![], unreadable: 0, needs_pose }.fuse();
+        let lines = lines.map(move |read| {
+            let mut line = read?;
+            if let Some(extrinsics) = extrinsics {
+                extrinsics.apply_to_frame(&mut line.observation);
+            }
+            Ok(line)
+        });
         let frames: Box<dyn Iterator<Item = Result<Observation, SourceError>> + Send> =
             match self.max_pose_gap {
                 Some(gap) => Box::new(InterpolatedFrames::new(lines, gap.get())),

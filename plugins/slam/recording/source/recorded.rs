@@ -2,9 +2,11 @@ use super::assemble::{
     TimeMatching, default_share, is_default_share, read_ground_truth, read_matched, read_objects,
 };
 use super::camera::CameraChoice;
+use super::extrinsics::Extrinsics;
 use super::rectification::{Distortion, Rectification};
 use super::{InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::Sequence;
+use manifactor_geometry::Se3;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
@@ -29,6 +31,11 @@ pub struct RecordedFiles {
     pub folder: PathBuf,
     /// The camera.
     pub camera: CameraChoice,
+    /// Pose of the camera in the frame of the body, if odometry and ground truth are poses of a body, such as a
+    /// robot: the translation in metres, and the rotation as a unit quaternion (x, y, z, w). The camera frame has x
+    /// to the right, y down and z forward. Default: they are poses of the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_from_camera: Option<Se3>,
     /// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV, to rectify
     /// boxes. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -83,15 +90,20 @@ impl SequenceSource for RecordedFiles {
             without_pose: self.max_without_pose,
             max_pose_gap: self.max_pose_gap,
         };
-        let (frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
+        let (mut frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
         lens.apply(&mut detections)?;
         let mut truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         if self.objects.is_some() || truth.is_some() {
             let objects = read_objects(&folder, self.objects.as_deref())?;
             truth.get_or_insert_default().objects = objects;
         }
+        if let Some(extrinsics) = self.body_from_camera.map(Extrinsics::new) {
+            frames.iter_mut().for_each(|frame| extrinsics.apply_to_pose(&mut frame.world_from_camera));
+            truth.iter_mut().for_each(|truth| extrinsics.apply_to_ground_truth(truth));
+        }
         Ok(Sequence {
             camera: lens.camera,
+            body_from_camera: self.body_from_camera,
             frames,
             detections,
             up: self.up,

@@ -15,6 +15,13 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Distortion([f64; 5]);
 
+impl Distortion {
+    /// Creates a distortion from k₁, k₂, p₁, p₂, k₃.
+    pub(super) fn new(coefficients: [f64; 5]) -> Self {
+        Self(coefficients)
+    }
+}
+
 /// Mapping from the images of a camera to the images of its pinhole camera.
 #[derive(Debug)]
 pub(super) struct Rectification {

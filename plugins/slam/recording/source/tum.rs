@@ -86,6 +86,7 @@ impl SequenceSource for TumRgbd {
         };
         Ok(Sequence {
             camera: lens.camera,
+            body_from_camera: None,
             frames,
             detections,
             up: None,

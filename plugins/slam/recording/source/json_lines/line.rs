@@ -6,8 +6,8 @@ use crate::sequence::{Acceleration, ClassScores, Detection, Frame, ObjectId, Obs
 use indexmap::IndexMap;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
-use manifactor_graph::Noise;
 use manifactor_graph::checked::Share;
+use manifactor_graph::{Manifold, Noise};
 use manifactor_quadric::BoundingBox;
 use nalgebra::Vector3;
 use serde::de::DeserializeOwned;
@@ -48,9 +48,6 @@ struct CorrectedPose {
     timestamp: f64,
     pose: Se3,
 }
-
-/// Rows of a pose residual: rotation, translation.
-const POSE_ROWS: usize = 6;
 
 /// A box in the form of a line; `quantities` collects all further fields.
 #[derive(Debug, Serialize, Deserialize)]
@@ -158,7 +155,7 @@ fn read_items<T: DeserializeOwned>(
 /// Reads the noise of a step.
 fn read_noise(noise: Value) -> Result<Arc<Noise>, String> {
     let noise: Noise = serde_json::from_value(noise).map_err(|error| error.to_string())?;
-    noise.whitener(POSE_ROWS).map_err(|error| error.to_string())?;
+    noise.whitener(Se3::TANGENT.len()).map_err(|error| error.to_string())?;
     Ok(Arc::new(noise))
 }
 

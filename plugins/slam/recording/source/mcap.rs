@@ -1,0 +1,423 @@
+use super::assemble::{
+    MatchedDetections, TimeMatching, default_share, is_default_share, match_by_time, read_detections,
+    read_ground_truth,
+};
+use super::camera::CameraChoice;
+use super::extrinsics::Extrinsics;
+use super::rectification::{Distortion, Rectification};
+use super::{InputFolders, SequenceSource, SourceError, check_files};
+use crate::sequence::{ClassScores, Detection, Sequence, UnusedInput};
+use manifactor_formats::tum::StampedPose;
+use manifactor_geometry::Se3;
+use manifactor_graph::checked::{NotNegative, Positive, Share};
+use manifactor_graph::{Direction, register};
+use manifactor_quadric::{BoundingBox, Camera};
+use manifactor_ros::messages::CameraInfo;
+use manifactor_ros::{BagError, Contents, Role, TransformError};
+use recorded_messages::{BoxesOfImage, RecordedMessages};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+mod recorded_messages;
+
+/// A recording of a robot that runs ROS 2, as an MCAP file.
+///
+/// It needs three topics: poses (`nav_msgs/Odometry`, `geometry_msgs/PoseStamped`,
+/// `geometry_msgs/PoseWithCovarianceStamped`, or transforms), boxes (`vision_msgs/Detection2DArray`), and the
+/// calibration of the camera (`sensor_msgs/CameraInfo`). A topic that is the only one of its type need not be named.
+/// The pose of the camera on the robot comes from the transforms (`/tf`, `/tf_static`). `manifactor inspect` lists
+/// the topics of a file. Poses are interpolated at the times of the images.
+///
+/// ```toml
+/// source = { type = "mcap", file = "drive.mcap", odometry = "/odom", detections = "/detections" }
+/// ```
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Mcap {
+    /// Path of the recording, relative to the document.
+    pub file: PathBuf,
+    /// Topic of the poses. Default: the only topic with a type of poses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<String>,
+    /// Topic of the boxes. Default: the only topic of its type.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detections: Option<String>,
+    /// CSV file of boxes in place of a topic, relative to the document, for a detector that ran later.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detections_file: Option<PathBuf>,
+    /// Topic of the camera's calibration. Default: the only topic of its type, or the only one with the frame of
+    /// the boxes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_info: Option<String>,
+    /// The camera in place of a topic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraChoice>,
+    /// Set if the boxes were found in the rectified image.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub rectified: bool,
+    /// Frame in which transforms give the odometry, if `odometry` is a topic of transforms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odometry_frame: Option<String>,
+    /// Frame that has the poses of the odometry. Default: `child_frame_id` of the messages.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_frame: Option<String>,
+    /// Frame of the camera: x to the right, y down, z forward. Default: that of the camera's calibration, or of the
+    /// boxes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_frame: Option<String>,
+    /// Pose of the camera in the frame of the body, in place of transforms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_from_camera: Option<Se3>,
+    /// Names of the classes by their number from 0, for a detector that gives numbers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub classes: Vec<String>,
+    /// Largest time between two poses, to interpolate the pose of an image between them. Unit: seconds.
+    #[serde(default = "pose_gap")]
+    pub max_pose_gap: Positive,
+    /// Largest expected share of boxes without a pose at their time, from 0 to 1. If more lack a pose, the run ends
+    /// with exit code 1.
+    #[serde(default = "default_share", skip_serializing_if = "is_default_share")]
+    pub max_without_pose: Share,
+    /// Ground-truth trajectory of the body, if there is one: path of a file in TUM's format, relative to the
+    /// document.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<PathBuf>,
+    /// Up direction in the odometry frame, if known. In frames of ROS it is [0, 0, 1].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<Direction>,
+}
+
+fn pose_gap() -> Positive {
+    Positive::literal(0.5)
+}
+
+/// Error that prevents reading a sequence from a recording.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum McapError {
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Bag(#[from] BagError),
+    /// No topic has messages of the needed types.
+    #[error("{}: no topic has messages of {types}; {instead}. Topics: {topics}", file.display())]
+    NoTopic {
+        /// The recording.
+        file: PathBuf,
+        /// The types.
+        types: String,
+        /// Setting that supplies the data in another way.
+        instead: &'static str,
+        /// All topics with their types.
+        topics: String,
+    },
+    /// Several topics could be meant.
+    #[error("{}: several topics have messages of {types}: set `source.{setting}` to one of {topics}", file.display())]
+    SeveralTopics {
+        /// The recording.
+        file: PathBuf,
+        /// The types.
+        types: String,
+        /// The setting.
+        setting: &'static str,
+        /// The topics.
+        topics: String,
+    },
+    /// A setting names a topic that does not exist or has a different type.
+    #[error("{}: `source.{setting}` names `{topic}`, which {fault}. Topics: {topics}", file.display())]
+    WrongTopic {
+        /// The recording.
+        file: PathBuf,
+        /// The setting.
+        setting: &'static str,
+        /// The topic.
+        topic: String,
+        /// The fault.
+        fault: String,
+        /// All topics with their types.
+        topics: String,
+    },
+    /// A frame has no name.
+    #[error("{}: the messages of `{topic}` do not name {what}: set `source.{setting}`, or `source.body_from_camera`", file.display())]
+    NoFrame {
+        /// The recording.
+        file: PathBuf,
+        /// The topic.
+        topic: String,
+        /// The frame.
+        what: &'static str,
+        /// The setting.
+        setting: &'static str,
+    },
+    /// The boxes come from several cameras.
+    #[error("{}: the boxes of `{topic}` come from several cameras, {cameras}: set `source.camera_frame` to one of them", file.display())]
+    SeveralCameras {
+        /// The recording.
+        file: PathBuf,
+        /// The topic.
+        topic: String,
+        /// Their frames.
+        cameras: String,
+    },
+    /// The pose of the camera on the body is not known.
+    #[error("{}: the pose of the camera is not known: {source}; `source.body_from_camera` can give it", file.display())]
+    NoTransform {
+        /// The recording.
+        file: PathBuf,
+        /// The reason.
+        source: TransformError,
+    },
+    /// All poses are missing or cannot be used.
+    #[error("{}: `{topic}` has no pose that can be used{why}", file.display())]
+    NoPoses {
+        /// The recording.
+        file: PathBuf,
+        /// The topic.
+        topic: String,
+        /// The reason, with a colon before it.
+        why: String,
+    },
+    /// The calibration cannot be used.
+    #[error("{}: the calibration in `{topic}` cannot be used: {fault}; `source.camera` can give the camera", file.display())]
+    Camera {
+        /// The recording.
+        file: PathBuf,
+        /// The topic.
+        topic: String,
+        /// The fault.
+        fault: String,
+    },
+}
+
+#[typetag::serialize(name = "mcap")]
+impl SequenceSource for Mcap {
+    fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
+        let file = folders.beside_document(&self.file);
+        let mut ground_truth = match &self.ground_truth {
+            Some(truth) => read_ground_truth(&folders.document, Some(truth))?,
+            None => None,
+        };
+        let messages = RecordedMessages::read(self, &file)?;
+        let lens = self.camera(&file, &messages)?;
+        let (poses, body_from_camera) = self.camera_poses(&file, &messages)?;
+        if let (Some(pose), Some(truth)) = (body_from_camera, &mut ground_truth) {
+            Extrinsics::new(pose).apply_to_ground_truth(truth);
+        }
+        let (images, rows, mut unused) = match &self.detections_file {
+            Some(rows) => {
+                let rows = read_detections(&folders.beside_document(rows))?;
+                (rows.iter().map(|(timestamp, _)| *timestamp).collect(), rows, vec![])
+            }
+            None => self.detections(&messages.boxes),
+        };
+        let by = TimeMatching {
+            within: NotNegative::literal(1e-6),
+            without_pose: self.max_without_pose,
+            max_pose_gap: Some(self.max_pose_gap),
+        };
+        let from = [&messages.detections_topic, &messages.odometry_topic].map(Path::new);
+        let (frames, mut detections, without): MatchedDetections =
+            match_by_time(&poses, images, rows, by, from)?;
+        lens.apply(&mut detections)?;
+        unused.extend(without);
+        Ok(Sequence {
+            camera: lens.camera,
+            body_from_camera,
+            frames,
+            detections,
+            up: self.up,
+            accelerometer: vec![],
+            ground_truth,
+            pose_factors: vec![],
+            unused,
+        })
+    }
+
+    fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
+        let files =
+            [Some(self.file.as_path()), self.detections_file.as_deref(), self.ground_truth.as_deref()];
+        check_files(&folders.document, &files)
+    }
+
+    fn may_have_up(&self) -> bool {
+        self.up.is_some()
+    }
+}
+register!(dyn SequenceSource, "mcap", Mcap);
+
+impl Mcap {
+    /// Returns the topic that a setting names, or the only one with a use.
+    fn topic(
+        &self,
+        file: &Path,
+        contents: &Contents,
+        role: Role,
+        (setting, named): (&'static str, Option<&String>),
+        instead: &'static str,
+    ) -> Result<String, McapError> {
+        let all = || {
+            let topic = |(name, topic): (&String, &manifactor_ros::TopicContents)| {
+                format!("`{name}` ({}, {} messages)", topic.message_type, topic.messages)
+            };
+            let all: Vec<String> = contents.topics.iter().map(topic).collect();
+            if all.is_empty() { "none".to_owned() } else { all.join(", ") }
+        };
+        let types = || role.types().join(" or ");
+        let file = file.to_owned();
+        if let Some(named) = named {
+            let allows_transforms = role == Role::Odometry;
+            let fault = match contents.topics.get(named) {
+                None => "is not in the recording".to_owned(),
+                Some(topic) if topic.role == Some(role) => return Ok(named.clone()),
+                Some(topic) if topic.role == Some(Role::Transforms) && allows_transforms => {
+                    return Ok(named.clone());
+                }
+                Some(topic) => format!("has messages of {}, not of {}", topic.message_type, types()),
+            };
+            return Err(McapError::WrongTopic { file, setting, topic: named.clone(), fault, topics: all() });
+        }
+        match contents.with_role(role)[..] {
+            [] => Err(McapError::NoTopic { file, types: types(), instead, topics: all() }),
+            [only] => Ok(only.to_owned()),
+            ref several => {
+                let several: Vec<String> = several.iter().map(|name| format!("`{name}`")).collect();
+                Err(McapError::SeveralTopics { file, types: types(), setting, topics: several.join(", ") })
+            }
+        }
+    }
+
+    /// Returns the camera of the boxes.
+    fn camera(&self, file: &Path, messages: &RecordedMessages) -> Result<Rectification, SourceError> {
+        if let Some(choice) = &self.camera {
+            return Rectification::new(choice, None);
+        }
+        let Some((topic, info)) = &messages.camera else {
+            // `read` has made sure that there is a topic; it has no message that can be decoded
+            let fault = "no message can be decoded".into();
+            return Err(
+                McapError::Camera { file: file.to_owned(), topic: "camera_info".into(), fault }.into()
+            );
+        };
+        let found = camera_of(info, self.rectified);
+        found.map_err(|fault| McapError::Camera { file: file.to_owned(), topic: topic.clone(), fault }.into())
+    }
+
+    /// Returns the poses of the camera in the odometry frame, and the pose of the camera on the body if it is
+    /// constant.
+    fn camera_poses(
+        &self,
+        file: &Path,
+        messages: &RecordedMessages,
+    ) -> Result<(Vec<StampedPose>, Option<Se3>), McapError> {
+        let no_frame = |topic: &str, what, setting| McapError::NoFrame {
+            file: file.to_owned(),
+            topic: topic.to_owned(),
+            what,
+            setting,
+        };
+        let no_transform = |source| McapError::NoTransform { file: file.to_owned(), source };
+        let mut poses = messages.poses.clone();
+        if let Some(pose) = self.body_from_camera {
+            poses.iter_mut().for_each(|stamped| Extrinsics::new(pose).apply_to_pose(&mut stamped.pose));
+            return Ok((poses, Some(pose)));
+        }
+        let body = self.body_frame.as_deref().or(messages.body_frame.as_deref());
+        let body = body.ok_or_else(|| {
+            no_frame(&messages.odometry_topic, "the frame that has the pose (`child_frame_id`)", "body_frame")
+        })?;
+        let camera = self.camera_frame.as_deref().or(messages.camera_frame.as_deref());
+        let camera = camera
+            .ok_or_else(|| no_frame(&messages.detections_topic, "the frame of the camera", "camera_frame"))?;
+        let transforms = &messages.transforms;
+        if body == camera {
+            return Ok((poses, None));
+        }
+        if transforms.times(body, camera).map_err(no_transform)?.is_empty() {
+            let pose = transforms.pose(body, camera, 0.0).map_err(no_transform)?;
+            poses.iter_mut().for_each(|stamped| Extrinsics::new(pose).apply_to_pose(&mut stamped.pose));
+            return Ok((poses, Some(pose)));
+        }
+        let (count, mut fault) = (poses.len(), None);
+        poses.retain_mut(|stamped| match transforms.pose(body, camera, stamped.timestamp) {
+            Ok(pose) => {
+                Extrinsics::new(pose).apply_to_pose(&mut stamped.pose);
+                true
+            }
+            Err(error) => {
+                fault.get_or_insert(error);
+                false
+            }
+        });
+        match fault {
+            Some(source) if poses.is_empty() => Err(no_transform(source)),
+            Some(error) => {
+                let left_out = count - poses.len();
+                tracing::warn!("{}: {left_out} of {count} poses are left out: {error}", file.display());
+                Ok((poses, None))
+            }
+            None => Ok((poses, None)),
+        }
+    }
+
+    /// Returns the times of the images and their boxes, and boxes that cannot be used.
+    fn detections(&self, boxes: &[BoxesOfImage]) -> (Vec<f64>, Vec<(f64, Detection)>, Vec<UnusedInput>) {
+        let (mut rows, mut unused) = (vec![], vec![]);
+        for image in boxes {
+            for (place, seen) in image.boxes.iter().enumerate() {
+                match seen.clone().and_then(|(bounds, scores)| self.detection(bounds, scores)) {
+                    Ok(detection) => rows.push((image.timestamp, detection)),
+                    Err(fault) => {
+                        unused.push(UnusedInput::Box { timestamp: image.timestamp, place: place + 1, fault });
+                    }
+                }
+            }
+        }
+        (boxes.iter().map(|image| image.timestamp).collect(), rows, unused)
+    }
+
+    fn detection(&self, bounds: [f64; 4], scores: Vec<(String, f64)>) -> Result<Detection, String> {
+        let bounding_box = BoundingBox::new(bounds).map_err(|error| error.to_string())?;
+        if let Some((class, score)) = scores.iter().find(|(_, score)| !(0.0..=1.0).contains(score)) {
+            return Err(format!("the score of `{class}` must be a number from 0 to 1, got {score}"));
+        }
+        let name = |class: String| {
+            let named = class.parse::<usize>().ok().and_then(|number| self.classes.get(number));
+            named.cloned().unwrap_or(class)
+        };
+        let scores: ClassScores = scores.into_iter().map(|(class, score)| (name(class), score)).collect();
+        let quantities = crate::measurement::Quantities::NONE;
+        Ok(Detection { frame: 0, object: None, scores, bounding_box, quantities })
+    }
+}
+
+/// Returns the camera of a calibration, and its distortion unless the images are rectified.
+fn camera_of(info: &CameraInfo, is_rectified: bool) -> Result<Rectification, String> {
+    let CameraInfo { height, width, distortion_model, d, k, p, .. } = info;
+    let (name, matrix) = if is_rectified { ("p", p) } else { ("k", k) };
+    let row = if is_rectified { 4 } else { 3 };
+    if matrix.len() != 3 * row {
+        return Err(format!("expected {} numbers in `{name}`, got {}", 3 * row, matrix.len()));
+    }
+    let numbers = [matrix[0], matrix[row + 1], matrix[2], matrix[row + 2]];
+    if numbers[0] == 0.0 {
+        return Err("the camera is not calibrated: its focal length is 0".into());
+    }
+    let camera = Camera::new(numbers, *width, *height).map_err(|error| error.to_string())?;
+    if is_rectified || d.iter().all(|coefficient| *coefficient == 0.0) {
+        return Ok(Rectification::of_pinhole(camera, None));
+    }
+    match (distortion_model.as_str(), &d[..]) {
+        ("plumb_bob" | "radtan", [k1, k2, p1, p2, rest @ ..]) if rest.len() <= 1 => {
+            let k3 = rest.first().copied().unwrap_or(0.0);
+            Ok(Rectification::of_pinhole(camera, Some(Distortion::new([*k1, *k2, *p1, *p2, k3]))))
+        }
+        (model, coefficients) => Err(format!(
+            "expected the distortion model `plumb_bob` with 4 or 5 coefficients, got `{model}` with {}; for boxes in \
+             the rectified image set `source.rectified = true`",
+            coefficients.len()
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,225 @@
+//! Messages of a recording that a sequence is made of.
+use super::{Mcap, McapError};
+use manifactor_formats::tum::StampedPose;
+use manifactor_graph::Manifold;
+use manifactor_ros::messages::{CameraInfo, Detection2D, Detection2DArray, FramedPose, TransformList};
+use manifactor_ros::{BagMessage, Contents, DecodeError, Ending, Role, Transforms, read};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Name of topics with constant transforms ends with this.
+const STATIC: &str = "tf_static";
+
+/// A box as its sides and classes, or the reason why it cannot be used.
+pub(super) type BoxOrFault = Result<([f64; 4], Vec<(String, f64)>), String>;
+
+/// Boxes of an image.
+pub(super) struct BoxesOfImage {
+    /// Unit: seconds.
+    pub timestamp: f64,
+    frame: String,
+    pub boxes: Vec<BoxOrFault>,
+}
+
+impl BoxesOfImage {
+    #[cfg(test)]
+    pub(super) fn new(timestamp: f64, boxes: Vec<BoxOrFault>) -> Self {
+        Self { timestamp, frame: String::new(), boxes }
+    }
+}
+
+/// Messages that a sequence is made of.
+#[derive(Default)]
+pub(super) struct RecordedMessages {
+    pub odometry_topic: String,
+    pub detections_topic: String,
+    /// Poses of the body in the odometry frame, sorted by time.
+    pub poses: Vec<StampedPose>,
+    /// Frame that has these poses, if the messages say it.
+    pub body_frame: Option<String>,
+    /// Frame of the camera, if the messages say it.
+    pub camera_frame: Option<String>,
+    pub boxes: Vec<BoxesOfImage>,
+    /// Calibration with its topic.
+    pub camera: Option<(String, CameraInfo)>,
+    pub transforms: Transforms,
+}
+
+/// Messages that cannot be used, by topic: their number, and the first fault.
+#[derive(Default)]
+struct UnusedMessages(BTreeMap<String, (usize, String)>);
+
+impl UnusedMessages {
+    fn add(&mut self, topic: &str, fault: &dyn ToString) {
+        self.0.entry(topic.to_owned()).or_insert_with(|| (0, fault.to_string())).0 += 1;
+    }
+}
+
+impl RecordedMessages {
+    /// Reads the messages. Messages that cannot be used are counted and logged.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or lacks something that is needed.
+    pub(super) fn read(source: &Mcap, file: &Path) -> Result<Self, McapError> {
+        let contents = Contents::of(file)?;
+        let instead = "`source.odometry` can name a topic of transforms, such as `/tf`";
+        let odometry =
+            source.topic(file, &contents, Role::Odometry, ("odometry", source.odometry.as_ref()), instead)?;
+        let detections = match &source.detections_file {
+            Some(rows) => rows.display().to_string(),
+            None => {
+                let instead = "`source.detections_file` can name a CSV file of boxes";
+                let named = ("detections", source.detections.as_ref());
+                source.topic(file, &contents, Role::Detections, named, instead)?
+            }
+        };
+        let frame_of_boxes = source
+            .camera_frame
+            .clone()
+            .or_else(|| contents.topics.get(&detections).and_then(|topic| topic.frame.clone()));
+        let camera_info = match &source.camera {
+            Some(_) => None,
+            None => Some(Self::camera_topic(source, file, &contents, frame_of_boxes.as_deref())?),
+        };
+        let mut found = Self { odometry_topic: odometry, detections_topic: detections, ..Self::default() };
+        let mut unused = UnusedMessages::default();
+        let ending = read(file, |message| {
+            let name = &message.topic.name;
+            let is_transforms = Role::of(&message.topic.message_type) == Some(Role::Transforms);
+            let done = if is_transforms {
+                found.add_transforms(&message)
+            } else if *name == found.odometry_topic {
+                found.add_pose(&message)
+            } else if *name == found.detections_topic {
+                found.add_boxes(&message)
+            } else if Some(name) == camera_info.as_ref() && found.camera.is_none() {
+                message
+                    .decode()
+                    .map(|info| found.camera = Some((name.clone(), info)))
+                    .map_err(|error| text(&error))
+            } else {
+                Ok(())
+            };
+            if let Err(fault) = done {
+                unused.add(name, &fault);
+            }
+        })?;
+        if let Ending::Fault(fault) = ending {
+            tracing::warn!("{}: the rest of the recording is not read: {fault}", file.display());
+        }
+        found.finish(source, file, &mut unused)?;
+        for (topic, (count, fault)) in unused.0 {
+            tracing::warn!("{}: {count} messages of `{topic}` are left out: {fault}", file.display());
+        }
+        Ok(found)
+    }
+
+    /// Returns the topic of the calibration: the named one, the only one, or the only one with a frame.
+    fn camera_topic(
+        source: &Mcap,
+        file: &Path,
+        contents: &Contents,
+        frame: Option<&str>,
+    ) -> Result<String, McapError> {
+        let candidates = contents.with_role(Role::CameraInfo).into_iter();
+        let of_frame: Vec<&str> = candidates
+            .filter(|name| frame.is_some() && contents.topics[*name].frame.as_deref() == frame)
+            .collect();
+        let only = of_frame.first().filter(|_| of_frame.len() == 1).map(|name| (*name).to_owned());
+        let named = source.camera_info.clone().or(only);
+        let instead = "`source.camera` can give the camera";
+        source.topic(file, contents, Role::CameraInfo, ("camera_info", named.as_ref()), instead)
+    }
+
+    fn add_transforms(&mut self, message: &BagMessage<'_>) -> Result<(), String> {
+        let is_constant = message.topic.name.ends_with(STATIC);
+        let transforms: TransformList = message.decode().map_err(|error| text(&error))?;
+        match self.transforms.add(&transforms, is_constant) {
+            0 => Ok(()),
+            faults => Err(format!("{faults} transforms have no unit quaternion as rotation")),
+        }
+    }
+
+    fn add_pose(&mut self, message: &BagMessage<'_>) -> Result<(), String> {
+        let Some(pose) = FramedPose::of(message) else { return Ok(()) };
+        let FramedPose { header, child, pose } = pose.map_err(|error| text(&error))?;
+        let pose = pose.to_se3().map_err(|error| error.to_string())?;
+        if !pose.is_finite() {
+            return Err("a pose is not finite".into());
+        }
+        self.body_frame = self.body_frame.take().or(child);
+        self.poses.push(StampedPose { timestamp: header.stamp.seconds(), pose });
+        Ok(())
+    }
+
+    fn add_boxes(&mut self, message: &BagMessage<'_>) -> Result<(), String> {
+        let Detection2DArray { header, detections } = message.decode().map_err(|error| text(&error))?;
+        let read = |seen: &Detection2D| Ok((seen.bounds()?, seen.scores()?));
+        let boxes =
+            detections.iter().map(|seen| read(seen).map_err(|fault: &str| fault.to_owned())).collect();
+        self.boxes.push(BoxesOfImage { timestamp: header.stamp.seconds(), frame: header.frame_id, boxes });
+        Ok(())
+    }
+
+    /// Sorts the poses, and selects the boxes of one camera.
+    fn finish(&mut self, source: &Mcap, file: &Path, unused: &mut UnusedMessages) -> Result<(), McapError> {
+        let no_poses = |topic: &str, why: Option<&str>| McapError::NoPoses {
+            file: file.to_owned(),
+            topic: topic.to_owned(),
+            why: why.map_or(String::new(), |why| format!(": {why}")),
+        };
+        if let (Some(frame), Some(body)) = (&source.odometry_frame, &source.body_frame) {
+            let times = self.transforms.times(frame, body);
+            let times = times.map_err(|source| McapError::NoTransform { file: file.to_owned(), source })?;
+            for timestamp in times {
+                match self.transforms.pose(frame, body, timestamp) {
+                    Ok(pose) => self.poses.push(StampedPose { timestamp, pose }),
+                    Err(fault) => unused.add(&self.odometry_topic, &fault),
+                }
+            }
+        } else if self.poses.is_empty() && !unused.0.contains_key(&self.odometry_topic) {
+            let why = "transforms are poses with `source.odometry_frame` and `source.body_frame`";
+            return Err(no_poses(&self.odometry_topic, Some(why)));
+        }
+        let order = self.poses.windows(2).filter(|pair| pair[1].timestamp < pair[0].timestamp).count();
+        self.poses.sort_by(|a, b| a.timestamp.total_cmp(&b.timestamp));
+        let count = self.poses.len();
+        self.poses.dedup_by(|b, a| a.timestamp == b.timestamp);
+        if order + count - self.poses.len() > 0 {
+            tracing::warn!(
+                "{}: `{}`: {order} poses are out of order, {} have the time of another and are left out",
+                file.display(),
+                self.odometry_topic,
+                count - self.poses.len()
+            );
+        }
+        if self.poses.is_empty() {
+            let why = unused.0.get(&self.odometry_topic).map(|(_, fault)| fault.as_str());
+            return Err(no_poses(&self.odometry_topic, why));
+        }
+        let cameras: BTreeSet<&str> = self.boxes.iter().map(|image| image.frame.as_str()).collect();
+        let wanted = source.camera_frame.as_deref();
+        if cameras.len() > 1 && wanted.is_none_or(|wanted| !cameras.contains(wanted)) {
+            let cameras: Vec<String> = cameras.iter().map(|name| format!("`{name}`")).collect();
+            return Err(McapError::SeveralCameras {
+                file: file.to_owned(),
+                topic: self.detections_topic.clone(),
+                cameras: cameras.join(", "),
+            });
+        }
+        if cameras.len() > 1 {
+            let count = self.boxes.len();
+            self.boxes.retain(|image| Some(image.frame.as_str()) == wanted);
+            let others = count - self.boxes.len();
+            tracing::warn!("{}: {others} images of other cameras are left out", file.display());
+        }
+        let of_camera = self.camera.as_ref().map(|(_, info)| info.header.frame_id.clone());
+        let of_boxes = self.boxes.first().map(|image| image.frame.clone());
+        self.camera_frame = [of_camera, of_boxes].into_iter().flatten().find(|name| !name.is_empty());
+        Ok(())
+    }
+}
+
+fn text(error: &DecodeError) -> String {
+    error.to_string()
+}
