@@ -1,7 +1,7 @@
 //! The command line.
 use crate::commands::{
-    Check, CheckFactor, CheckManifold, Completions, Evaluate, Experiment, Explain, Learn, List, Man, New,
-    Online, Plot, Replay, Run, Schema, ShowGraph, Simulate, Solve,
+    Check, CheckFactor, CheckManifold, Completions, Evaluate, Experiment, Explain, Inspect, Learn, List, Man,
+    New, Online, Plot, Replay, Run, Schema, ShowGraph, Simulate, Solve,
 };
 use crate::failure::Failure;
 use crate::output::text::count;
@@ -56,6 +56,7 @@ enum Command {
     Evaluate(Evaluate),
     Learn(Learn),
     Simulate(Simulate),
+    Inspect(Inspect),
     Schema(Schema),
     Completions(Completions),
     Man(Man),
@@ -94,6 +95,7 @@ impl Cli {
             Command::Evaluate(command) => command.run(),
             Command::Learn(command) => command.run(),
             Command::Simulate(command) => command.run(),
+            Command::Inspect(command) => command.run(),
             Command::Schema(command) => command.run(),
             Command::Completions(command) => Ok(command.run(Self::command())),
             Command::Man(command) => command.run(Self::command()),
@@ -137,6 +139,7 @@ impl Cli {
             Command::Explain(command) => command.json,
             Command::Graph(command) => command.json,
             Command::Evaluate(command) => command.json,
+            Command::Inspect(command) => command.json,
             Command::Learn(_)
             | Command::New(_)
             | Command::Plot(_)

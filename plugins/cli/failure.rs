@@ -4,8 +4,9 @@ use manifactor::config::{Diagnostic, Diagnostics, Fault, SourceText};
 use manifactor::formats::journal::JournalError;
 use manifactor::formats::{FormatError, Malformed};
 use manifactor::slam::output::{FolderError, OutputError};
+use manifactor::slam::ros::BagError;
 use manifactor::slam::run::RunError;
-use manifactor::slam::source::SourceError;
+use manifactor::slam::source::{McapError, SourceError};
 use miette::{LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use serde_json::{Value, json};
 use std::io::IsTerminal;
@@ -137,9 +138,19 @@ impl From<SourceError> for Failure {
     fn from(error: SourceError) -> Self {
         match error {
             SourceError::Format(error) => error.into(),
+            SourceError::Mcap(McapError::Bag(error)) => error.into(),
             SourceError::NoFolder { setting, name, tried, no_data_folder } => {
                 no_folder(setting, &name, &tried, no_data_folder)
             }
+            other => Self::input(other),
+        }
+    }
+}
+
+impl From<BagError> for Failure {
+    fn from(error: BagError) -> Self {
+        match error {
+            BagError::Io { path, source } => Self::File { path, source },
             other => Self::input(other),
         }
     }

@@ -12,6 +12,16 @@ use csv::{ReaderBuilder, StringRecord, Trim, Writer};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
+mod coco;
+mod format;
+mod frames;
+mod kitti;
+mod mot;
+mod yolo;
+
+pub use format::DetectionFormat;
+pub use frames::FrameTimes;
+
 /// A row: one bounding box in one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -55,6 +65,25 @@ const OPTIONAL: [&str; 6] =
     ["frame_idx", "frame_idx_as_published", "object_key", "class_id", "scores", "depth"];
 
 impl DetectionRow {
+    /// Creates a row with only the required columns.
+    fn of_box(timestamp: f64, class: &str, score: f64, [xmin, ymin, xmax, ymax]: [f64; 4]) -> Self {
+        Self {
+            frame_idx: None,
+            timestamp,
+            frame_idx_as_published: None,
+            object_key: None,
+            class_id: None,
+            class_name: class.to_owned(),
+            score,
+            xmin,
+            ymin,
+            xmax,
+            ymax,
+            scores: None,
+            depth: None,
+        }
+    }
+
     /// Returns the classes with their scores: all of `scores`, otherwise the best alone. Empty for a box
     /// without a class.
     ///

@@ -139,7 +139,13 @@ mod tests {
     #[test]
     fn topics_are_counted_and_their_use_is_guessed() {
         let texts = (0..3).map(|i| ("/chatter", f64::from(i), string_message("hello")));
-        let poses = (0..5_u32).map(|i| ("/pose", 0.5 * f64::from(i), pose_message(i, "map", [0.0; 3])));
+        let poses = (0..5_u32).map(|i| {
+            (
+                "/pose",
+                0.5 * f64::from(i),
+                pose_message(i.into(), "map", &manifactor_geometry::Se3::identity()),
+            )
+        });
         let bytes = recording(&[("/chatter", STRING), ("/pose", POSE_STAMPED)], texts.chain(poses));
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), bytes).unwrap();

@@ -9,8 +9,8 @@ mod decode;
 pub mod messages;
 mod transforms;
 
-#[cfg(test)]
-mod testing;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
 
 pub use bag::{BagError, BagMessage, Ending, Topic, read};
 pub use contents::{Contents, Role, TopicContents};

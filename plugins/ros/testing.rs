@@ -1,28 +1,69 @@
 //! Recordings for tests.
+#![allow(clippy::unwrap_used, reason = "for tests")]
+use manifactor_geometry::Se3;
 use mcap::records::MessageHeader;
 use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
 
 /// Name and definition of a message type.
-pub(crate) type MessageType = (&'static str, &'static str);
+pub type MessageType = (&'static str, &'static str);
 
-pub(crate) const STRING: MessageType = ("std_msgs/msg/String", "string data");
-pub(crate) const POSE_STAMPED: MessageType = (
-    "geometry_msgs/msg/PoseStamped",
-    "std_msgs/Header header\nPose pose\n\
-     ===\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
-     ===\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n\
-     ===\nMSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n\
-     ===\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n\
-     ===\nMSG: geometry_msgs/Quaternion\nfloat64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1",
+/// A text.
+pub const STRING: MessageType = ("std_msgs/msg/String", "string data");
+
+/// Definition of a type by its fields, with definitions of the types that it contains.
+macro_rules! definition {
+    ($fields:literal) => {
+        concat!(
+            $fields,
+            "\n===\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n",
+            "===\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
+            "===\nMSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n",
+            "===\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n",
+            "===\nMSG: geometry_msgs/Quaternion\nfloat64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n",
+            "===\nMSG: geometry_msgs/PoseWithCovariance\nPose pose\nfloat64[36] covariance\n",
+            "===\nMSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\nTransform transform\n",
+            "===\nMSG: geometry_msgs/Transform\nVector3 translation\nQuaternion rotation\n",
+            "===\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n",
+            "===\nMSG: vision_msgs/Detection2D\nstd_msgs/Header header\nObjectHypothesisWithPose[] results\nBoundingBox2D bbox\nstring id\n",
+            "===\nMSG: vision_msgs/ObjectHypothesisWithPose\nObjectHypothesis hypothesis\n",
+            "===\nMSG: vision_msgs/ObjectHypothesis\nstring class_id\nfloat64 score\n",
+            "===\nMSG: vision_msgs/BoundingBox2D\nvision_msgs/Pose2D center\nfloat64 size_x\nfloat64 size_y\n",
+            "===\nMSG: vision_msgs/Pose2D\nvision_msgs/Point2D position\nfloat64 theta\n",
+            "===\nMSG: vision_msgs/Point2D\nfloat64 x\nfloat64 y\n",
+        )
+    };
+}
+
+/// A pose.
+pub const POSE_STAMPED: MessageType =
+    ("geometry_msgs/msg/PoseStamped", definition!("std_msgs/Header header\ngeometry_msgs/Pose pose"));
+/// Odometry without the velocity.
+pub const ODOMETRY: MessageType = (
+    "nav_msgs/msg/Odometry",
+    definition!("std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose"),
 );
+/// Transforms between frames.
+pub const TRANSFORMS: MessageType =
+    ("tf2_msgs/msg/TFMessage", definition!("geometry_msgs/TransformStamped[] transforms"));
+/// Calibration of a camera.
+pub const CAMERA_INFO: MessageType = (
+    "sensor_msgs/msg/CameraInfo",
+    definition!(
+        "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p"
+    ),
+);
+/// Boxes.
+pub const DETECTIONS: MessageType =
+    ("vision_msgs/msg/Detection2DArray", definition!("std_msgs/Header header\nDetection2D[] detections"));
 
 /// Content of a message, little-endian and aligned.
-#[derive(Default)]
-pub(crate) struct Cdr(Vec<u8>);
+#[derive(Debug, Default)]
+pub struct Cdr(Vec<u8>);
 
 impl Cdr {
-    pub(crate) fn new() -> Self {
+    /// Creates an empty content.
+    pub fn new() -> Self {
         Self::default()
     }
     fn put(mut self, bytes: &[u8]) -> Self {
@@ -32,43 +73,101 @@ impl Cdr {
         self.0.extend_from_slice(bytes);
         self
     }
-    pub(crate) fn u8(self, x: u8) -> Self {
+    /// Appends a byte.
+    pub fn u8(self, x: u8) -> Self {
         self.put(&[x])
     }
-    pub(crate) fn u32(self, x: u32) -> Self {
+    /// Appends a number.
+    pub fn u32(self, x: u32) -> Self {
         self.put(&x.to_le_bytes())
     }
-    pub(crate) fn i64(self, x: i64) -> Self {
+    /// Appends a number.
+    pub fn i64(self, x: i64) -> Self {
         self.put(&x.to_le_bytes())
     }
-    pub(crate) fn f32(self, x: f32) -> Self {
+    /// Appends a number.
+    pub fn f32(self, x: f32) -> Self {
         self.put(&x.to_le_bytes())
     }
-    pub(crate) fn f64(self, x: f64) -> Self {
+    /// Appends a number.
+    pub fn f64(self, x: f64) -> Self {
         self.put(&x.to_le_bytes())
     }
-    pub(crate) fn string(self, text: &str) -> Self {
+    /// Appends a text.
+    pub fn string(self, text: &str) -> Self {
         let mut cdr = self.u32(text.len() as u32 + 1);
         cdr.0.extend_from_slice(text.as_bytes());
         cdr.0.push(0);
         cdr
     }
-    pub(crate) fn bytes(self) -> Vec<u8> {
+    /// Returns the bytes with the header of the encoding.
+    pub fn bytes(self) -> Vec<u8> {
         [vec![0, 1, 0, 0], self.0].concat()
     }
 }
 
-pub(crate) fn string_message(text: &str) -> Vec<u8> {
+/// Returns a [`STRING`] message.
+pub fn string_message(text: &str) -> Vec<u8> {
     Cdr::new().string(text).bytes()
 }
 
-pub(crate) fn pose_message(sec: u32, frame: &str, position: [f64; 3]) -> Vec<u8> {
-    let header = Cdr::new().u32(sec).u32(0).string(frame);
-    position.into_iter().chain([0.0, 0.0, 0.0, 1.0]).fold(header, Cdr::f64).bytes()
+/// Returns the header of a message; the time is rounded to nanoseconds.
+fn header(cdr: Cdr, seconds: f64, frame: &str) -> Cdr {
+    let nanoseconds = (seconds * 1e9).round() as u64;
+    cdr.u32((nanoseconds / 1_000_000_000) as u32).u32((nanoseconds % 1_000_000_000) as u32).string(frame)
+}
+
+fn pose(cdr: Cdr, pose: &Se3) -> Cdr {
+    let position: [f64; 3] = pose.translation.into();
+    position.into_iter().chain(pose.rotation.quaternion_xyzw()).fold(cdr, Cdr::f64)
+}
+
+/// Returns a [`POSE_STAMPED`] message.
+pub fn pose_message(seconds: f64, frame: &str, at: &Se3) -> Vec<u8> {
+    pose(header(Cdr::new(), seconds, frame), at).bytes()
+}
+
+/// Returns an [`ODOMETRY`] message.
+pub fn odometry_message(seconds: f64, frame: &str, child: &str, at: &Se3) -> Vec<u8> {
+    let cdr = pose(header(Cdr::new(), seconds, frame).string(child), at);
+    [0.0; 36].into_iter().fold(cdr, Cdr::f64).bytes()
+}
+
+/// Returns a [`TRANSFORMS`] message with one transform.
+pub fn transform_message(seconds: f64, parent: &str, child: &str, at: &Se3) -> Vec<u8> {
+    pose(header(Cdr::new().u32(1), seconds, parent).string(child), at).bytes()
+}
+
+/// Returns a [`CAMERA_INFO`] message of a camera with fx, fy, cx, cy, its width and height, and its distortion.
+pub fn camera_message(
+    frame: &str,
+    [fx, fy, cx, cy]: [f64; 4],
+    [width, height]: [u32; 2],
+    (model, d): (&str, &[f64]),
+) -> Vec<u8> {
+    let cdr = header(Cdr::new(), 1.0, frame).u32(height).u32(width).string(model).u32(d.len() as u32);
+    let k = [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0];
+    let r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    let p = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
+    d.iter().copied().chain(k).chain(r).chain(p).fold(cdr, Cdr::f64).bytes()
+}
+
+/// Returns a [`DETECTIONS`] message of boxes with sides xmin, ymin, xmax, ymax, a class and a score.
+pub fn detections_message(seconds: f64, frame: &str, boxes: &[([f64; 4], &str, f64)]) -> Vec<u8> {
+    let cdr = header(Cdr::new(), seconds, frame).u32(boxes.len() as u32);
+    let add = |cdr: Cdr, ([xmin, ymin, xmax, ymax], class, score): &([f64; 4], &str, f64)| {
+        let cdr = header(cdr, seconds, frame).u32(1).string(class).f64(*score);
+        let center = [0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 0.0];
+        center.into_iter().chain([xmax - xmin, ymax - ymin]).fold(cdr, Cdr::f64).string("")
+    };
+    boxes.iter().fold(cdr, add).bytes()
 }
 
 /// Returns an MCAP file with compressed chunks. Messages have a topic, a time in seconds, and a content.
-pub(crate) fn recording<'a>(
+///
+/// # Panics
+/// If a message has an unknown topic.
+pub fn recording<'a>(
     topics: &[(&str, MessageType)],
     messages: impl Iterator<Item = (&'a str, f64, Vec<u8>)>,
 ) -> Vec<u8> {

@@ -15,5 +15,6 @@ pub use manifactor_recording::{
     class, fusion, journal, measurement, pose_graph, prior_map, recording, register_measurement, sequence,
     source, stream,
 };
+pub use manifactor_ros as ros;
 pub use manifactor_run::{output, record, report, run};
 pub use manifactor_simulator as simulator;

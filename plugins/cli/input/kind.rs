@@ -30,6 +30,8 @@ pub(crate) enum InputKind {
     VariantFolder,
     /// A folder for the source `recorded`.
     Recording,
+    /// A recording of ROS 2, for the source `mcap`.
+    Mcap,
 }
 
 impl InputKind {
@@ -46,6 +48,12 @@ impl InputKind {
             () if has("semantics") => Some(Self::Rules),
             () => None,
         }
+    }
+
+    /// Returns the kind of a file that is no text; `None` for other extensions.
+    pub(crate) fn of_extension(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?;
+        ["mcap", "db3", "bag"].contains(&extension).then_some(Self::Mcap)
     }
 
     /// Returns the kind of a text that is no document; `None` if neither the extension of `path` nor the
@@ -91,6 +99,7 @@ impl InputKind {
             Self::RunFolder => "the folder of a run",
             Self::VariantFolder => "the folder of a variant of a run",
             Self::Recording => "a recording",
+            Self::Mcap => "a recording of ROS",
         }
     }
 
@@ -130,6 +139,9 @@ impl InputKind {
             Self::Recording => format!(
                 "`manifactor run RUN.toml` maps it, if RUN.toml has `source = {{ type = \"recorded\", folder = \"{path}\", … }}`; \
                  see `manifactor explain recorded`"
+            ),
+            Self::Mcap => format!(
+                "`manifactor inspect {path}` lists its topics, and the `source` with which `manifactor run RUN.toml` maps it"
             ),
         }
     }

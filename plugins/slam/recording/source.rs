@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 mod assemble;
 mod camera;
+mod detections;
 mod extrinsics;
 mod interpolation;
 pub mod journal;
@@ -18,6 +19,7 @@ pub mod stream;
 mod tum;
 
 pub use camera::CameraChoice;
+pub use detections::DetectionsFile;
 pub use interpolation::NoPose;
 pub use json_lines::parse;
 pub use json_lines::{JsonLines, format_line};

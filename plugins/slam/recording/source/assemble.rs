@@ -1,16 +1,17 @@
 //! Frames and detections, matched by time.
-use super::SourceError;
 use super::interpolation::pose_at;
+use super::{DetectionsFile, SourceError};
 use crate::measurement::{DepthMeasurement, Quantities};
 use crate::recording::OBJECTS_FILE;
 use crate::sequence::{
     ClassScores, Detection, DetectionsWithoutPose, Frame, GroundTruth, ObjectId, TrueObject, UnusedInput,
 };
 use manifactor_config::{Document, Errors};
+use manifactor_formats::detections::DetectionRow;
+use manifactor_formats::tum;
 use manifactor_formats::tum::{StampedPose, Trajectory};
-use manifactor_formats::{detections, tum};
 use manifactor_graph::checked::{NotNegative, Positive, Share};
-use manifactor_quadric::BoundingBox;
+use manifactor_quadric::{BoundingBox, Camera};
 use std::path::Path;
 
 /// Frames, their detections, and the detections without a frame.
@@ -55,22 +56,16 @@ pub(super) fn is_default_share(share: &Share) -> bool {
 /// # Errors
 /// Files that cannot be read, or detections that all lack a frame.
 pub(super) fn read_matched(
+    folder: &Path,
     odometry: &Path,
-    file: &Path,
+    file: &DetectionsFile,
+    camera: &Camera,
     by: TimeMatching,
 ) -> Result<MatchedDetections, SourceError> {
-    let poses = read_poses(odometry)?;
-    let rows = read_detections(file)?;
+    let odometry = folder.join(odometry);
+    let (poses, rows) = (read_poses(&odometry)?, file.read(folder, camera)?);
     let images: Vec<f64> = rows.iter().map(|(timestamp, _)| *timestamp).collect();
-    match_by_time(&poses, images, rows, by, [file, odometry])
-}
-
-/// Reads detections with their timestamps.
-///
-/// # Errors
-/// A file that cannot be read.
-pub(super) fn read_detections(file: &Path) -> Result<Vec<(f64, Detection)>, SourceError> {
-    Ok(detections::read(file)?.iter().map(|row| (row.timestamp, detection(row))).collect())
+    match_by_time(&poses, images, rows, by, [&file.path(folder), &odometry])
 }
 
 /// Assigns each detection to the frame nearest in time. Frames are the poses, or the images with an interpolated
@@ -167,7 +162,8 @@ fn nearest(times: &[f64], timestamp: f64) -> Option<(usize, f64)> {
     away.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-fn detection(row: &detections::DetectionRow) -> Detection {
+/// Returns the detection of a row, for frame 0.
+pub(super) fn detection(row: &DetectionRow) -> Detection {
     let scores: ClassScores = match row.class_scores() {
         Ok(scores) => scores.into_iter().collect(),
         // cannot happen: the reader has checked the scores

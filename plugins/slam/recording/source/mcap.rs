@@ -1,11 +1,10 @@
 use super::assemble::{
-    MatchedDetections, TimeMatching, default_share, is_default_share, match_by_time, read_detections,
-    read_ground_truth,
+    MatchedDetections, TimeMatching, default_share, is_default_share, match_by_time, read_ground_truth,
 };
 use super::camera::CameraChoice;
 use super::extrinsics::Extrinsics;
 use super::rectification::{Distortion, Rectification};
-use super::{InputFolders, SequenceSource, SourceError, check_files};
+use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::{ClassScores, Detection, Sequence, UnusedInput};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -43,9 +42,10 @@ pub struct Mcap {
     /// Topic of the boxes. Default: the only topic of its type.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detections: Option<String>,
-    /// CSV file of boxes in place of a topic, relative to the document, for a detector that ran later.
+    /// File of boxes in place of a topic, relative to the document, for a detector that ran later: a CSV file, or a
+    /// table with the `format` of another program.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub detections_file: Option<PathBuf>,
+    pub detections_file: Option<DetectionsFile>,
     /// Topic of the camera's calibration. Default: the only topic of its type, or the only one with the frame of
     /// the boxes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -205,7 +205,7 @@ impl SequenceSource for Mcap {
         }
         let (images, rows, mut unused) = match &self.detections_file {
             Some(rows) => {
-                let rows = read_detections(&folders.beside_document(rows))?;
+                let rows = rows.read(&folders.document, &lens.camera)?;
                 (rows.iter().map(|(timestamp, _)| *timestamp).collect(), rows, vec![])
             }
             None => self.detections(&messages.boxes),
@@ -234,8 +234,9 @@ impl SequenceSource for Mcap {
     }
 
     fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
-        let files =
-            [Some(self.file.as_path()), self.detections_file.as_deref(), self.ground_truth.as_deref()];
+        let others = [Some(self.file.as_path()), self.ground_truth.as_deref()];
+        let rows = self.detections_file.iter().flat_map(DetectionsFile::files);
+        let files: Vec<_> = others.into_iter().chain(rows.map(Some)).collect();
         check_files(&folders.document, &files)
     }
 

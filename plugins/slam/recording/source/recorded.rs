@@ -4,7 +4,7 @@ use super::assemble::{
 use super::camera::CameraChoice;
 use super::extrinsics::Extrinsics;
 use super::rectification::{Distortion, Rectification};
-use super::{InputFolders, SequenceSource, SourceError, check_files};
+use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::Sequence;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
@@ -43,9 +43,9 @@ pub struct RecordedFiles {
     /// Odometry file in the folder.
     #[serde(default = "odometry")]
     pub odometry: PathBuf,
-    /// Detections file in the folder.
+    /// Detections in the folder: a CSV file, or a table with the `format` of another program.
     #[serde(default = "detections")]
-    pub detections: PathBuf,
+    pub detections: DetectionsFile,
     /// Ground-truth file in the folder. Default: `groundtruth.txt`, if there is such a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
@@ -72,7 +72,7 @@ pub struct RecordedFiles {
 fn odometry() -> PathBuf {
     "odometry.txt".into()
 }
-fn detections() -> PathBuf {
+fn detections() -> DetectionsFile {
     "detections.csv".into()
 }
 fn exact() -> NotNegative {
@@ -84,13 +84,13 @@ impl SequenceSource for RecordedFiles {
     fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.folder, "source.folder")?;
         let lens = Rectification::new(&self.camera, self.distortion)?;
-        let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
         let by = TimeMatching {
             within: self.max_time_difference,
             without_pose: self.max_without_pose,
             max_pose_gap: self.max_pose_gap,
         };
-        let (mut frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
+        let (mut frames, mut detections, unused) =
+            read_matched(&folder, &self.odometry, &self.detections, &lens.camera, by)?;
         lens.apply(&mut detections)?;
         let mut truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         if self.objects.is_some() || truth.is_some() {
@@ -116,13 +116,9 @@ impl SequenceSource for RecordedFiles {
 
     fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
         let folder = folders.data_set(&self.folder, "source.folder")?;
-        let files = &[
-            Some(self.odometry.as_path()),
-            Some(self.detections.as_path()),
-            self.ground_truth.as_deref(),
-            self.objects.as_deref(),
-        ];
-        check_files(&folder, files)
+        let others = [Some(self.odometry.as_path()), self.ground_truth.as_deref(), self.objects.as_deref()];
+        let files: Vec<_> = self.detections.files().into_iter().map(Some).chain(others).collect();
+        check_files(&folder, &files)
     }
 
     fn may_have_up(&self) -> bool {

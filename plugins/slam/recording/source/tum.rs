@@ -1,7 +1,7 @@
 use super::assemble::{TimeMatching, default_share, is_default_share, read_ground_truth, read_matched};
 use super::camera::{CameraChoice, by_folder};
 use super::rectification::{Distortion, Rectification};
-use super::{InputFolders, SequenceSource, SourceError, check_files};
+use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
@@ -27,9 +27,9 @@ pub struct TumRgbd {
     pub sequence: PathBuf,
     /// Odometry file in the folder, in TUM's format.
     pub odometry: PathBuf,
-    /// Detections file in the folder.
+    /// Detections in the folder: a CSV file, or a table with the `format` of another program.
     #[serde(default = "detections")]
-    pub detections: PathBuf,
+    pub detections: DetectionsFile,
     /// Ground-truth file in the folder. Default: `groundtruth.txt`, if there is such a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
@@ -54,7 +54,7 @@ pub struct TumRgbd {
     pub max_pose_gap: Option<Positive>,
 }
 
-fn detections() -> PathBuf {
+fn detections() -> DetectionsFile {
     "detections_yolov3_associated.csv".into()
 }
 fn exact() -> NotNegative {
@@ -69,13 +69,13 @@ impl SequenceSource for TumRgbd {
             Some(choice) => Rectification::new(choice, self.distortion)?,
             None => Rectification::of_pinhole(by_folder(&folder)?, self.distortion),
         };
-        let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
         let by = TimeMatching {
             within: self.max_time_difference,
             without_pose: self.max_without_pose,
             max_pose_gap: self.max_pose_gap,
         };
-        let (frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
+        let (frames, mut detections, unused) =
+            read_matched(&folder, &self.odometry, &self.detections, &lens.camera, by)?;
         lens.apply(&mut detections)?;
         let truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         let file = folder.join("accelerometer.txt");
@@ -99,9 +99,9 @@ impl SequenceSource for TumRgbd {
 
     fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
         let folder = folders.data_set(&self.sequence, "source.sequence")?;
-        let files =
-            &[Some(self.odometry.as_path()), Some(self.detections.as_path()), self.ground_truth.as_deref()];
-        check_files(&folder, files)
+        let others = [Some(self.odometry.as_path()), self.ground_truth.as_deref()];
+        let files: Vec<_> = self.detections.files().into_iter().map(Some).chain(others).collect();
+        check_files(&folder, &files)
     }
 
     fn may_have_up(&self) -> bool {

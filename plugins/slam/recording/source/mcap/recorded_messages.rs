@@ -66,7 +66,7 @@ impl RecordedMessages {
         let odometry =
             source.topic(file, &contents, Role::Odometry, ("odometry", source.odometry.as_ref()), instead)?;
         let detections = match &source.detections_file {
-            Some(rows) => rows.display().to_string(),
+            Some(rows) => rows.path(Path::new("")).display().to_string(),
             None => {
                 let instead = "`source.detections_file` can name a CSV file of boxes";
                 let named = ("detections", source.detections.as_ref());

@@ -41,3 +41,171 @@ fn classes_by_number_get_their_names_and_faulty_boxes_are_reported() {
     let classes: Vec<&str> = rows[0].1.scores.iter().map(|(class, _)| class).collect();
     assert_eq!(classes, ["cup", "7", "vase"]);
 }
+
+mod recordings {
+    use super::*;
+    use manifactor_geometry::So3;
+    use manifactor_graph::Manifold;
+    use manifactor_ros::testing::*;
+    use nalgebra::{Vector3, Vector6};
+
+    type Message = (&'static str, f64, Vec<u8>);
+
+    const TOPICS: [(&str, MessageType); 6] = [
+        ("/odom", ODOMETRY),
+        ("/tf", TRANSFORMS),
+        ("/tf_static", TRANSFORMS),
+        ("/detections", DETECTIONS),
+        ("/camera_info", CAMERA_INFO),
+        ("/chatter", STRING),
+    ];
+    const CUP: ([f64; 4], &str, f64) = ([100.0, 120.0, 180.0, 260.0], "cup", 0.8);
+
+    /// Pose of the body.
+    fn body(t: f64) -> Se3 {
+        Se3::exp(&(t * Vector6::new(0.0, 0.0, 0.2, 0.5, 0.1, 0.0)))
+    }
+
+    fn mast() -> Se3 {
+        Se3::new(So3::identity(), Vector3::new(0.2, 0.0, 0.8))
+    }
+
+    /// Pose of the camera, which looks ahead, on the mast.
+    fn optical() -> Se3 {
+        Se3::new(So3::from_quaternion_xyzw([-0.5, 0.5, -0.5, 0.5]).unwrap(), Vector3::new(0.05, 0.0, 0.0))
+    }
+
+    fn camera_info(frame: &str) -> Message {
+        let distortion: (&str, &[f64]) = ("plumb_bob", &[0.0; 5]);
+        ("/camera_info", 0.0, camera_message(frame, [500.0, 510.0, 320.0, 240.0], [640, 480], distortion))
+    }
+
+    /// Odometry at 10 Hz, images at 7.5 Hz with other times.
+    fn messages() -> Vec<Message> {
+        let mut all: Vec<Message> = vec![
+            ("/tf_static", 0.0, transform_message(0.0, "base_link", "mast", &mast())),
+            ("/tf_static", 0.0, transform_message(0.0, "mast", "camera", &optical())),
+            camera_info("camera"),
+        ];
+        for i in 0..30 {
+            let t = 0.1 * f64::from(i);
+            all.push(("/odom", t, odometry_message(100.0 + t, "odom", "base_link", &body(t))));
+            let t = 0.13 * f64::from(i) + 0.05;
+            all.push(("/detections", t, detections_message(100.0 + t, "camera", &[CUP])));
+        }
+        all
+    }
+
+    fn load(
+        settings: serde_json::Value,
+        messages: impl IntoIterator<Item = Message>,
+    ) -> Result<Sequence, SourceError> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.mcap"), recording(&TOPICS, messages.into_iter())).unwrap();
+        let mut settings = settings;
+        settings["file"] = "a.mcap".into();
+        let source: Mcap = serde_json::from_value(settings).unwrap();
+        source.load(&InputFolders { data: None, document: folder.path().into() })
+    }
+
+    fn without(topic: &str) -> impl Iterator<Item = Message> {
+        messages().into_iter().filter(move |(name, ..)| *name != topic)
+    }
+
+    #[test]
+    fn frames_are_images_with_the_interpolated_pose_of_the_camera() {
+        let found = load(json!({}), messages()).unwrap();
+        // the last images come after the last pose
+        assert_eq!(found.frames.len(), 22);
+        let UnusedInput::WithoutPose(without) = &found.unused[0] else { panic!() };
+        assert_eq!((without.rows, without.of), (8, 30));
+        for frame in &found.frames {
+            let expected = body(frame.timestamp - 100.0).compose(&mast()).compose(&optical());
+            assert!(frame.world_from_camera.local(&expected).norm() < 1e-6, "{}", frame.timestamp);
+        }
+        assert!(found.body_from_camera.unwrap().local(&mast().compose(&optical())).norm() < 1e-12);
+        let seen = &found.detections[0];
+        assert_eq!((seen.bounding_box.bounds(), seen.scores.best()), (CUP.0, Some(("cup", 0.8))));
+        assert_eq!((found.camera.fy, found.camera.width), (510.0, 640));
+    }
+
+    #[test]
+    fn poses_can_come_from_transforms_and_the_camera_can_turn() {
+        let turn = |t: f64| Se3::exp(&Vector6::new(0.0, 0.0, 0.3 * t, 0.0, 0.0, 0.0));
+        let moving = (0..30).flat_map(|i| {
+            let t = 0.1 * f64::from(i);
+            let odometry = transform_message(100.0 + t, "odom", "base_link", &body(t));
+            let camera = transform_message(100.0 + t, "base_link", "camera", &turn(t));
+            [("/tf", t, odometry), ("/tf", t, camera)]
+        });
+        let images = without("/odom").filter(|(name, ..)| *name != "/tf_static");
+        let settings = json!({"odometry": "/tf", "odometry_frame": "odom", "body_frame": "base_link"});
+        let found = load(settings, images.chain(moving)).unwrap();
+        assert_eq!((found.frames.len(), found.body_from_camera), (22, None));
+        for frame in &found.frames {
+            let t = frame.timestamp - 100.0;
+            let expected = body(t).compose(&turn(t));
+            assert!(frame.world_from_camera.local(&expected).norm() < 1e-3, "{t}");
+        }
+    }
+
+    #[test]
+    fn what_a_recording_lacks_is_named_with_the_remedy() {
+        let faults: Vec<(serde_json::Value, Vec<Message>, &str)> = vec![
+            (json!({}), without("/odom").collect(), "`source.odometry` can name a topic of transforms"),
+            (json!({}), without("/detections").collect(), "`source.detections_file` can name a CSV file"),
+            (json!({}), without("/camera_info").collect(), "`source.camera` can give the camera"),
+            (json!({}), without("/tf_static").collect(), "no transform has the frame `base_link`"),
+            (
+                json!({"odometry": "/odo"}),
+                messages(),
+                "`source.odometry` names `/odo`, which is not in the recording",
+            ),
+            (json!({"detections": "/odom"}), messages(), "not of vision_msgs/msg/Detection2DArray"),
+            (json!({"camera_frame": "cam"}), messages(), "no transform has the frame `cam`; there are"),
+            (
+                json!({"odometry": "/tf"}),
+                messages()
+                    .into_iter()
+                    .chain([("/tf", 0.0, transform_message(0.0, "a", "b", &mast()))])
+                    .collect(),
+                "`source.odometry_frame` and `source.body_frame`",
+            ),
+            (
+                json!({}),
+                messages()
+                    .into_iter()
+                    .chain([("/detections", 9.0, detections_message(109.0, "rear", &[CUP]))])
+                    .collect(),
+                "several cameras, `camera`, `rear`",
+            ),
+        ];
+        for (settings, messages, words) in faults {
+            let error = load(settings, messages).unwrap_err().to_string();
+            assert!(error.contains(words) && error.contains("a.mcap"), "{error}");
+        }
+    }
+
+    #[test]
+    fn damaged_messages_are_left_out_alone() {
+        let mut damaged = messages();
+        let odometry: Vec<usize> = (0..damaged.len()).filter(|i| damaged[*i].0 == "/odom").collect();
+        damaged[odometry[3]].2.truncate(40);
+        damaged[odometry[5]].2 = odometry_message(
+            100.5,
+            "odom",
+            "base_link",
+            &Se3::new(So3::identity(), Vector3::new(f64::NAN, 0.0, 0.0)),
+        );
+        let last = damaged.len();
+        damaged.swap(odometry[7], odometry[8]);
+        damaged[last - 1].2.truncate(9);
+        let found = load(json!({}), damaged).unwrap();
+        assert_eq!(found.frames.len(), 22);
+        let worst = found.frames.iter().map(|frame| {
+            let expected = body(frame.timestamp - 100.0).compose(&mast()).compose(&optical());
+            frame.world_from_camera.local(&expected).norm()
+        });
+        assert!(worst.fold(0.0, f64::max) < 1e-6);
+    }
+}
