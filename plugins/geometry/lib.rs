@@ -21,7 +21,8 @@ mod procrustes;
 pub mod testing;
 
 pub use bundle::{
-    AnyCamera, BalCamera, Camera, CameraError, CameraModel, Projection, ProjectionBal, RadialTangential,
+    AnyCamera, BalCamera, Camera, CameraError, CameraModel, Distortion, DistortionError, DoubleSphere,
+    ExtendedUnified, KannalaBrandt, Projection, ProjectionBal, RadialTangential,
 };
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{

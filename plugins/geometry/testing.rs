@@ -95,6 +95,11 @@ pub fn camera_law<M: CameraModel>(camera: &M, point: &Vector3<f64>) -> Result<()
     }
 }
 
+/// Returns the direction at an angle to the optical axis, turned about it.
+pub fn ray(angle: f64, turn: f64) -> Vector3<f64> {
+    Vector3::new(angle.sin() * turn.cos(), angle.sin() * turn.sin(), angle.cos())
+}
+
 /// Tangent vectors of SO(2) inside its chart.
 pub fn so2_tangent() -> impl Strategy<Value = Vector1<f64>> + Clone {
     signed_angle().prop_map(Vector1::new)

@@ -65,12 +65,52 @@ pub trait ProjectionName {
     const PROJECTION: &'static str;
 }
 
-/// Maps a pixel of a camera to the rectified image; `None` for a direction that no pinhole camera can see.
+/// Cosine of the largest angle to the optical axis in the rectified image, 70°. There, a pixel of a fisheye camera
+/// is stretched 8 times, and the noise of a box with it.
+const MIN_COSINE: f64 = 0.342;
+
+/// Maps a pixel of a camera to the rectified image; `None` for a direction more than 70° from the optical axis.
 #[doc(hidden)]
 pub fn rectify<M: CameraModel>(camera: &M, pixel: &Vector2<f64>) -> Option<Vector2<f64>> {
     let direction = camera.unproject(pixel)?;
-    (direction.z > 0.0).then(|| camera.pinhole().project(&direction))
+    (direction.z > MIN_COSINE * direction.norm()).then(|| camera.pinhole().project(&direction))
 }
+
+/// Defines the document of a camera: the numbers of its pinhole camera without skew, then those of its lens.
+macro_rules! camera_document {
+    ($name:literal, $($(#[$text:meta])* $field:ident: $type:ty),+) => {
+        #[derive(serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        #[schemars(rename = $name)]
+        struct Document {
+            /// Focal length along x, in pixels.
+            fx: f64,
+            /// Focal length along y, in pixels.
+            fy: f64,
+            /// Principal point, in pixels.
+            cx: f64,
+            /// Principal point, in pixels.
+            cy: f64,
+            /// Size of the image, in pixels.
+            width: u32,
+            /// Size of the image, in pixels.
+            height: u32,
+            $($(#[$text])* $field: $type),+
+        }
+
+        impl Document {
+            fn of(camera: crate::Camera, $($field: $type),+) -> Self {
+                let crate::Camera { fx, fy, cx, cy, width, height, .. } = camera;
+                Self { fx, fy, cx, cy, width, height, $($field),+ }
+            }
+
+            fn pinhole(&self) -> Result<crate::Camera, crate::CameraError> {
+                crate::Camera::new([self.fx, self.fy, self.cx, self.cy], self.width, self.height)
+            }
+        }
+    };
+}
+pub(crate) use camera_document;
 
 /// Registers a [`CameraModel`](crate::CameraModel) as a camera for sources, and its point projection as a
 /// factor: `register_camera!("radial_tangential", "projection_radial_tangential", RadialTangential);`

@@ -1,16 +1,18 @@
 //! Camera with radial and tangential lens distortion.
-use crate::{Camera, CameraError, CameraModel, Coordinates, register_camera};
-use manifactor_graph::Scalar;
-use nalgebra::{Vector2, Vector3};
+use crate::bundle::camera_model::camera_document;
+use crate::{Camera, CameraError, CameraModel, Point2, register_camera};
+use manifactor_graph::{Jet, JetOf, Manifold, Scalar};
+use nalgebra::{Matrix2, U2, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A camera with radial and tangential lens distortion, with five coefficients.
+/// A camera with radial and tangential lens distortion, with four, five or eight coefficients.
 ///
-/// A point at (x/z, y/z), with radius r, projects through the pinhole at (x/z, y/z) · (1 + k₁ r² + k₂ r⁴ + k₃
-/// r⁶) plus the tangential part (2 p₁ xy/z² + p₂ (r² + 2 x²/z²), p₁ (r² + 2 y²/z²) + 2 p₂ xy/z²); Brown,
-/// *Close-range camera calibration*, 1971. The model folds back beyond some radius; points beyond that radius
-/// are not seen.
+/// A point at (x/z, y/z), with radius r, projects through the pinhole at (x/z, y/z) · (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) /
+/// (1 + k₄ r² + k₅ r⁴ + k₆ r⁶) plus the tangential part (2 p₁ xy/z² + p₂ (r² + 2 x²/z²), p₁ (r² + 2 y²/z²) + 2 p₂
+/// xy/z²); Brown, *Close-range camera calibration*, 1971, and OpenCV for the denominator. It is `plumb_bob` and
+/// `rational_polynomial` of ROS, `radtan` of Kalibr, and `OPENCV` of COLMAP. The model folds back beyond some radius;
+/// points beyond that radius are not seen.
 ///
 /// ```toml
 /// [source]
@@ -23,51 +25,92 @@ use serde::{Deserialize, Serialize};
 #[schemars(with = "Document")]
 pub struct RadialTangential {
     pinhole: Camera,
-    /// k₁, k₂, p₁, p₂, k₃, in OpenCV's order.
-    distortion: [f64; 5],
+    distortion: Distortion,
     /// Largest squared radius x²/z² + y²/z² at which the model does not fold back.
     limit: f64,
 }
 
-#[derive(Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "RadialTangential")]
-struct Document {
-    /// Focal length along x, in pixels.
-    fx: f64,
-    /// Focal length along y, in pixels.
-    fy: f64,
-    /// Principal point, in pixels.
-    cx: f64,
-    /// Principal point, in pixels.
-    cy: f64,
-    /// Size of the image, in pixels.
-    width: u32,
-    /// Size of the image, in pixels.
-    height: u32,
-    /// Coefficients k₁, k₂, p₁, p₂, k₃, in OpenCV's order.
-    distortion: Coordinates<5>,
+camera_document! {
+    "RadialTangential",
+    /// Coefficients k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆ in OpenCV's order: the first four, five or all.
+    distortion: Distortion
 }
 
-/// Maximum number of fixed-point iterations of `unproject`, and its tolerance in units of the focal length.
-const MAX_ITERATIONS: usize = 100;
-const UNPROJECT_TOLERANCE: f64 = 1e-9;
+/// Coefficients k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆ of a [`RadialTangential`] camera, in the order of OpenCV: the first
+/// four, five or all eight.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
+#[schemars(with = "Vec<f64>")]
+pub struct Distortion {
+    coefficients: [f64; 8],
+    /// Number of coefficients that were given.
+    given: usize,
+}
+
+/// Error of coefficients that are no distortion.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("expected 4, 5 or 8 finite coefficients k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆, got {0:?}")]
+pub struct DistortionError(Vec<f64>);
+
+impl TryFrom<Vec<f64>> for Distortion {
+    type Error = DistortionError;
+    fn try_from(given: Vec<f64>) -> Result<Self, DistortionError> {
+        if !([4, 5, 8].contains(&given.len()) && given.iter().all(|k| k.is_finite())) {
+            return Err(DistortionError(given));
+        }
+        let mut coefficients = [0.0; 8];
+        coefficients.iter_mut().zip(&given).for_each(|(k, given)| *k = *given);
+        Ok(Self { coefficients, given: given.len() })
+    }
+}
+
+impl From<Distortion> for Vec<f64> {
+    fn from(distortion: Distortion) -> Self {
+        distortion.coefficients[..distortion.given].to_vec()
+    }
+}
+
+impl From<[f64; 5]> for Distortion {
+    fn from([k1, k2, p1, p2, k3]: [f64; 5]) -> Self {
+        Self { coefficients: [k1, k2, p1, p2, k3, 0.0, 0.0, 0.0], given: 5 }
+    }
+}
+
+/// Maximum number of Newton steps of `unproject`, and its tolerance in units of the focal length.
+const MAX_ITERATIONS: usize = 50;
+const UNPROJECT_TOLERANCE: f64 = 1e-12;
 
 impl RadialTangential {
-    /// Creates a camera with the coefficients k₁, k₂, p₁, p₂, k₃ in OpenCV's order.
-    pub fn new(pinhole: Camera, distortion: [f64; 5]) -> Self {
-        Self { pinhole, distortion, limit: fold_limit(distortion) }
+    /// Creates a camera with the focal lengths, principal point and size of `pinhole`.
+    pub fn new(pinhole: Camera, distortion: impl Into<Distortion>) -> Self {
+        let distortion = distortion.into();
+        Self { pinhole, distortion, limit: fold_limit(&distortion) }
     }
 
     /// Applies the distortion to the point (x/z, y/z), in units of the focal length from the principal point.
+    #[inline(always)]
     fn distort<T: Scalar>(&self, [x, y]: [T; 2]) -> [T; 2] {
-        let [k1, k2, p1, p2, k3] = self.distortion.map(T::from);
-        let [one, two] = [T::from(1.0), T::from(2.0)];
+        let [_, _, p1, p2, ..] = self.distortion.coefficients.map(T::from);
+        let two = T::from(2.0);
         let r2 = x * x + y * y;
-        let radial = one + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let radial = self.distortion.radial(r2);
         let sideways = two * p1 * x * y + p2 * (r2 + two * x * x);
         let upward = p1 * (r2 + two * y * y) + two * p2 * x * y;
         [x * radial + sideways, y * radial + upward]
+    }
+}
+
+impl Distortion {
+    /// Returns the radial factor at the squared radius.
+    #[inline(always)]
+    fn radial<T: Scalar>(&self, r2: T) -> T {
+        let [k1, k2, _, _, k3, k4, k5, k6] = self.coefficients.map(T::from);
+        let one = T::from(1.0);
+        let numerator = one + r2 * (k1 + r2 * (k2 + r2 * k3));
+        if self.given <= 5 {
+            return numerator;
+        }
+        numerator / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
     }
 }
 
@@ -75,14 +118,22 @@ impl RadialTangential {
 const FOLD_SAMPLES: u32 = 10_000;
 const FOLD_BISECTIONS: usize = 60;
 
-/// Returns the smallest s = r² > 0 at which r (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) stops growing with r; infinite if
-/// it never does.
-fn fold_limit([k1, k2, _, _, k3]: [f64; 5]) -> f64 {
-    // With t = 1/s the derivative is t³ + 3 k₁ t² + 5 k₂ t + 7 k₃, and positive at `bound`, above its largest
-    // root.
-    let grows = |t: f64| t * (t * (t + 3.0 * k1) + 5.0 * k2) + 7.0 * k3 > 0.0;
-    let bound = 1.0 + (3.0 * k1).abs().max((5.0 * k2).abs()).max((7.0 * k3).abs());
-    let at = |i: u32| bound * f64::from(i) / f64::from(FOLD_SAMPLES);
+/// Returns the smallest s = r² > 0 at which r times the radial factor stops growing with r, or has a pole; infinite
+/// if there is none.
+fn fold_limit(Distortion { coefficients: [k1, k2, _, _, k3, k4, k5, k6], .. }: &Distortion) -> f64 {
+    // with t = 1/s: numerator t³ N = t³ + k₁ t² + k₂ t + k₃, denominator t³ D in the same way; r N/D grows with r if
+    // N D + 2 s (N' D - N D') is positive, here times t⁶
+    let polynomial = |t: f64, [a, b, c]: [f64; 3]| t * (t * (t + a) + b) + c;
+    let slope = |t: f64, [a, b, c]: [f64; 3]| t * (t * a + 2.0 * b) + 3.0 * c;
+    let (n, d) = ([*k1, *k2, *k3], [*k4, *k5, *k6]);
+    let grows = |t: f64| {
+        let [up, down] = [polynomial(t, n), polynomial(t, d)];
+        down > 0.0 && up * down + 2.0 * (slope(t, n) * down - up * slope(t, d)) > 0.0
+    };
+    let size = n.iter().chain(&d).map(|k| k.abs()).sum::<f64>();
+    // above it, t⁶ exceeds all other terms together
+    let bound = 1.0 + 7.0 * size * (1.0 + size);
+    let at = |i: u32| bound * (f64::from(i) / f64::from(FOLD_SAMPLES)).powi(2);
     let Some(first) = (0..FOLD_SAMPLES).rev().find(|i| !grows(at(*i))).filter(|i| *i > 0) else {
         return f64::INFINITY;
     };
@@ -105,18 +156,38 @@ impl CameraModel for RadialTangential {
     }
 
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
-        let seen = self.pinhole.ray(*pixel);
-        let mut point = [seen.x, seen.y];
+        let seen = self.pinhole.ray(*pixel).xy();
+        let error = |point: &Vector2<f64>| Vector2::from(self.distort([point.x, point.y])) - seen;
+        let mut point = seen;
+        // the iteration begins inside the fold
+        let reach = 0.9 * self.limit.sqrt() / point.norm();
+        point *= reach.min(1.0);
+        let mut off = error(&point);
         for _ in 0..MAX_ITERATIONS {
-            let [x, y] = self.distort(point);
-            let off = [seen.x - x, seen.y - y];
-            point = [point[0] + off[0], point[1] + off[1]];
-            if off[0].hypot(off[1]) < UNPROJECT_TOLERANCE {
-                let direction = Vector3::new(point[0], point[1], 1.0);
+            if off.norm() < UNPROJECT_TOLERANCE {
+                let direction = Vector3::new(point.x, point.y, 1.0);
                 return self.sees(&direction).then_some(direction);
             }
+            let seeded = Point2::new(point).seed();
+            let mut jacobian = Matrix2::zeros();
+            for (i, coordinate) in self.distort([seeded.x, seeded.y]).iter().enumerate() {
+                jacobian.row_mut(i).copy_from_slice(JetOf::<U2>::gradient(coordinate)?);
+            }
+            let mut step = jacobian.try_inverse()? * off;
+            // a shorter step if it leaves the fold or does not come closer
+            let next = (0..MAX_ITERATIONS).find_map(|_| {
+                let next = point - step;
+                step *= 0.5;
+                let closer = error(&next).norm() < off.norm();
+                (closer && next.norm_squared() < self.limit).then_some(next)
+            });
+            let Some(next) = next else { break };
+            (point, off) = (next, error(&next));
         }
-        None
+        // the last digits of large numbers do not fit
+        let direction = Vector3::new(point.x, point.y, 1.0);
+        let is_close = off.norm() < 1e-9 * (1.0 + seen.norm());
+        (is_close && self.sees(&direction)).then_some(direction)
     }
 
     #[inline(always)]
@@ -135,15 +206,13 @@ register_camera!("radial_tangential", "projection_radial_tangential", RadialTang
 impl TryFrom<Document> for RadialTangential {
     type Error = CameraError;
     fn try_from(document: Document) -> Result<Self, CameraError> {
-        let Document { fx, fy, cx, cy, width, height, distortion } = document;
-        Ok(Self::new(Camera::new([fx, fy, cx, cy], width, height)?, distortion.vector().into()))
+        Ok(Self::new(document.pinhole()?, document.distortion))
     }
 }
 
 impl From<RadialTangential> for Document {
     fn from(camera: RadialTangential) -> Self {
-        let Camera { fx, fy, cx, cy, width, height, .. } = camera.pinhole;
-        Self { fx, fy, cx, cy, width, height, distortion: Coordinates::unchecked(camera.distortion.into()) }
+        Self::of(camera.pinhole, camera.distortion)
     }
 }
 
@@ -151,7 +220,7 @@ impl From<RadialTangential> for Document {
 mod tests {
     use super::*;
     use crate::testing::{any_se3, camera_law};
-    use crate::{Point3, Projection};
+    use crate::{Coordinates, Point3, Projection};
     use manifactor_testing::jacobian_laws;
     use manifactor_testing::strategies::vector;
     use proptest::prelude::*;

@@ -25,7 +25,6 @@ pub use json_lines::parse;
 pub use json_lines::{JsonLines, format_line};
 pub use mcap::{Mcap, McapError};
 pub use recorded::RecordedFiles;
-pub use rectification::Distortion;
 pub use stream::FrameStream;
 pub use tum::TumRgbd;
 

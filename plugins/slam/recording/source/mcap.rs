@@ -3,11 +3,11 @@ use super::assemble::{
 };
 use super::camera::CameraChoice;
 use super::extrinsics::Extrinsics;
-use super::rectification::{Distortion, Rectification};
+use super::rectification::Rectification;
 use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::{ClassScores, Detection, Sequence, UnusedInput};
 use manifactor_formats::tum::StampedPose;
-use manifactor_geometry::Se3;
+use manifactor_geometry::{AnyCamera, Distortion, KannalaBrandt, RadialTangential, Se3};
 use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::{BoundingBox, Camera};
@@ -17,6 +17,7 @@ use recorded_messages::{BoxesOfImage, RecordedMessages};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 mod recorded_messages;
 
@@ -407,17 +408,23 @@ fn camera_of(info: &CameraInfo, is_rectified: bool) -> Result<Rectification, Str
     if is_rectified || d.iter().all(|coefficient| *coefficient == 0.0) {
         return Ok(Rectification::of_pinhole(camera, None));
     }
-    match (distortion_model.as_str(), &d[..]) {
-        ("plumb_bob" | "radtan", [k1, k2, p1, p2, rest @ ..]) if rest.len() <= 1 => {
-            let k3 = rest.first().copied().unwrap_or(0.0);
-            Ok(Rectification::of_pinhole(camera, Some(Distortion::new([*k1, *k2, *p1, *p2, k3]))))
+    let model: Arc<dyn AnyCamera> = match distortion_model.as_str() {
+        "plumb_bob" | "radtan" | "rational_polynomial" => {
+            let distortion = Distortion::try_from(d.clone()).map_err(|error| error.to_string())?;
+            Arc::new(RadialTangential::new(camera, distortion))
         }
-        (model, coefficients) => Err(format!(
-            "expected the distortion model `plumb_bob` with 4 or 5 coefficients, got `{model}` with {}; for boxes in \
-             the rectified image set `source.rectified = true`",
-            coefficients.len()
-        )),
-    }
+        "equidistant" | "fisheye" => match d[..] {
+            [k1, k2, k3, k4] => Arc::new(KannalaBrandt::new(camera, [k1, k2, k3, k4])),
+            _ => return Err(format!("expected 4 coefficients of `{distortion_model}`, got {}", d.len())),
+        },
+        other => {
+            return Err(format!(
+                "expected the distortion model `plumb_bob`, `rational_polynomial` or `equidistant`, got `{other}`; for boxes \
+                 in the rectified image set `source.rectified = true`"
+            ));
+        }
+    };
+    Rectification::new(&CameraChoice::Model(model), None).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

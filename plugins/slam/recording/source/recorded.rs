@@ -3,10 +3,10 @@ use super::assemble::{
 };
 use super::camera::CameraChoice;
 use super::extrinsics::Extrinsics;
-use super::rectification::{Distortion, Rectification};
+use super::rectification::Rectification;
 use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::Sequence;
-use manifactor_geometry::Se3;
+use manifactor_geometry::{Distortion, Se3};
 use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
@@ -36,8 +36,8 @@ pub struct RecordedFiles {
     /// to the right, y down and z forward. Default: they are poses of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_from_camera: Option<Se3>,
-    /// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV, to rectify
-    /// boxes. Default: none.
+    /// Coefficients k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆ of a `radial_tangential` camera in the order of OpenCV, the first
+    /// four, five or all, to rectify boxes. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distortion: Option<Distortion>,
     /// Odometry file in the folder.

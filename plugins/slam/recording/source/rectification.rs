@@ -4,23 +4,10 @@
 //! the rectified image, and camera models appear only in this module.
 use super::{CameraChoice, SourceError};
 use crate::sequence::{Detection, Observation, UnusedInput};
-use manifactor_geometry::{AnyCamera, RadialTangential};
+use manifactor_geometry::{AnyCamera, Distortion, RadialTangential};
 use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::Vector2;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-
-/// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Distortion([f64; 5]);
-
-impl Distortion {
-    /// Creates a distortion from k₁, k₂, p₁, p₂, k₃.
-    pub(super) fn new(coefficients: [f64; 5]) -> Self {
-        Self(coefficients)
-    }
-}
 
 /// Mapping from the images of a camera to the images of its pinhole camera.
 #[derive(Debug)]
@@ -48,8 +35,8 @@ impl Rectification {
 
     /// Creates the rectification for a pinhole camera, with an optional distortion of its lens.
     pub(super) fn of_pinhole(camera: Camera, distortion: Option<Distortion>) -> Self {
-        let model = distortion.map(|Distortion(coefficients)| {
-            let model: Arc<dyn AnyCamera> = Arc::new(RadialTangential::new(camera, coefficients));
+        let model = distortion.map(|distortion| {
+            let model: Arc<dyn AnyCamera> = Arc::new(RadialTangential::new(camera, distortion));
             model
         });
         Self { camera, model }
@@ -109,7 +96,7 @@ mod tests {
     /// Returns the calibration of freiburg1, as the benchmark publishes it.
     fn freiburg1(distortion: [f64; 5]) -> Rectification {
         let named = serde_json::from_value::<CameraChoice>("freiburg1".into()).unwrap();
-        Rectification::new(&named, Some(Distortion(distortion))).unwrap()
+        Rectification::new(&named, Some(distortion.into())).unwrap()
     }
 
     const LENS: [f64; 5] = [0.2624, -0.9531, -0.0054, 0.0026, 1.1633];
@@ -139,10 +126,7 @@ mod tests {
         let of = |lens: &Rectification| rectified(&**lens.model.as_ref().unwrap(), &seen);
         assert_eq!(of(&model), of(&lens));
         assert_eq!(model.camera, lens.camera);
-        assert!(matches!(
-            Rectification::new(&named, Some(Distortion(LENS))),
-            Err(SourceError::DistortedTwice)
-        ));
+        assert!(matches!(Rectification::new(&named, Some(LENS.into())), Err(SourceError::DistortedTwice)));
     }
 
     #[test]

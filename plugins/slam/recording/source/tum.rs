@@ -1,9 +1,10 @@
 use super::assemble::{TimeMatching, default_share, is_default_share, read_ground_truth, read_matched};
 use super::camera::{CameraChoice, by_folder};
-use super::rectification::{Distortion, Rectification};
+use super::rectification::Rectification;
 use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
+use manifactor_geometry::Distortion;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::register;
 use schemars::JsonSchema;
@@ -36,8 +37,8 @@ pub struct TumRgbd {
     /// Camera by name or by its parameters. Default: the camera that the folder's name contains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraChoice>,
-    /// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV, to rectify
-    /// boxes. Default: none.
+    /// Coefficients k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆ of a `radial_tangential` camera in the order of OpenCV, the first
+    /// four, five or all, to rectify boxes. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distortion: Option<Distortion>,
     /// Largest time difference between a detection and its pose. Timestamps are written to the microsecond,

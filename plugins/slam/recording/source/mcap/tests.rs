@@ -18,8 +18,12 @@ fn a_calibration_gives_the_camera_of_the_image() {
     let rectified = camera_of(&info("equidistant", &[0.1; 4]), true).unwrap().camera;
     assert_eq!((rectified.fx, rectified.fy, rectified.cx, rectified.cy), (480.0, 490.0, 310.0, 230.0));
     assert!(camera_of(&info("equidistant", &[0.0; 4]), false).is_ok());
-    let fault = camera_of(&info("equidistant", &[0.1; 4]), false).unwrap_err();
-    assert!(fault.contains("`equidistant` with 4") && fault.contains("source.rectified"), "{fault}");
+    assert!(camera_of(&info("equidistant", &[0.1; 4]), false).is_ok());
+    assert!(camera_of(&info("rational_polynomial", &[0.01; 8]), false).is_ok());
+    let fault = camera_of(&info("fov", &[0.9]), false).unwrap_err();
+    assert!(fault.contains("got `fov`") && fault.contains("source.rectified"), "{fault}");
+    let fault = camera_of(&info("plumb_bob", &[0.1; 3]), false).unwrap_err();
+    assert!(fault.contains("expected 4, 5 or 8"), "{fault}");
     let uncalibrated = CameraInfo { k: vec![0.0; 9], ..info("", &[]) };
     assert!(camera_of(&uncalibrated, false).unwrap_err().contains("not calibrated"));
 }
