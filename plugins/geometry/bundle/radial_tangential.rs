@@ -248,6 +248,41 @@ mod tests {
         proptest!(|(point in any_visible_point())| prop_assert_eq!(camera_law(&freiburg1(), &point), Ok(())));
     }
 
+    /// A camera with eight coefficients, and pixels of points by `cv::projectPoints` of OpenCV 5.0.0.
+    fn rational() -> RadialTangential {
+        let pinhole = Camera::new([608.3, 608.1, 637.4, 366.2], 1280, 720).unwrap();
+        let all = vec![0.4821, -2.6133, 0.0003, -0.0004, 1.5231, 0.3630, -2.4392, 1.4513];
+        RadialTangential::new(pinhole, Distortion::try_from(all).unwrap())
+    }
+    const OPENCV: [([f64; 3], [f64; 2]); 5] = [
+        ([0.1, 0.2, 2.0], [667.856839872445, 427.10201360723346]),
+        ([-0.9, 0.5, 2.0], [357.5165396126511, 521.6522218749701]),
+        ([1.4, -0.8, 2.0], [1079.3331015388555, 113.77806149847058]),
+        ([0.0, 1.2, 2.0], [637.3124048, 741.042577163885]),
+        ([-1.9, -1.0, 2.0], [35.968892933961115, 50.11918144028607]),
+    ];
+
+    #[test]
+    fn pixels_of_eight_coefficients_are_those_of_opencv() {
+        for (point, pixel) in OPENCV {
+            let error = rational().project(&Vector3::from(point)) - Vector2::from(pixel);
+            assert!(error.norm() < 1e-9, "{point:?} {error}");
+        }
+        let size = || ([-0.95..0.95f64, -0.55..0.55], 0.5..10.0f64);
+        proptest!(|(([x, y], z) in size())| {
+            prop_assert_eq!(camera_law(&rational(), &(Vector3::new(x, y, 1.0) * z)), Ok(()));
+        });
+    }
+
+    #[test]
+    fn a_denominator_of_zero_ends_the_image() {
+        let all = vec![0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0];
+        let pole = RadialTangential::new(freiburg1().pinhole, Distortion::try_from(all).unwrap());
+        assert!((pole.limit - 1.0).abs() < 1e-9, "{}", pole.limit);
+        let error = Distortion::try_from(vec![0.1; 6]).unwrap_err().to_string();
+        assert!(error.contains("expected 4, 5 or 8"), "{error}");
+    }
+
     #[test]
     fn without_distortion_it_is_the_pinhole() {
         let plain = RadialTangential::new(freiburg1().pinhole, [0.0; 5]);

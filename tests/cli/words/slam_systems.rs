@@ -1,6 +1,13 @@
 //! `docs/slam-systems.md`: its document maps a recording, and its line is a frame with a closure.
 use super::block;
 use crate::{fed, folder, manifactor, path};
+use manifactor::geometry::{Se3, So3};
+use manifactor::nalgebra::Vector3;
+use manifactor_ros::testing::{
+    CAMERA_INFO, DETECTIONS, ODOMETRY, TRANSFORMS, camera_message, detections_message, odometry_message,
+    recording, transform_message,
+};
+use serde_json::Value;
 
 const CAMERA: &str = "camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
 
@@ -35,4 +42,97 @@ fn a_line_with_a_closure_is_a_frame() {
     assert!(!ran.stderr.contains("left out"), "{}", ran.stderr);
     let graph = std::fs::read_to_string(format!("{out}/estimate/graph.json")).unwrap();
     assert!(graph.contains("\"loop 3\""), "{graph}");
+}
+
+/// Frames of the simulated desk, one JSON object each.
+fn frames() -> Vec<Value> {
+    let lines = manifactor("simulate examples/desk/desk.toml --lines").ended(0).stdout;
+    lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// Writes frames as a robot records them: odometry of its base, and the boxes of a camera on it.
+fn drive(frames: &[Value], base_from_camera: &Se3) -> Vec<u8> {
+    let camera_from_base = base_from_camera.inverse();
+    let info = camera_message("camera", [320.0, 320.0, 320.0, 240.0], [640, 480], ("plumb_bob", &[0.0; 5]));
+    let start = [
+        ("/tf_static", 0.0, transform_message(0.0, "base_link", "camera", base_from_camera)),
+        ("/camera_info", 0.0, info),
+    ];
+    let messages = frames.iter().flat_map(|frame| {
+        let time = frame["timestamp"].as_f64().unwrap();
+        let pose: Se3 = serde_json::from_value(frame["pose"].clone()).unwrap();
+        let seen = frame["boxes"].as_array().unwrap().iter().map(|seen| {
+            let sides: [f64; 4] = serde_json::from_value(seen["box"].clone()).unwrap();
+            (
+                sides,
+                seen["class"].as_str().unwrap(),
+                seen.get("score").map_or(1.0, |score| score.as_f64().unwrap()),
+            )
+        });
+        let boxes = detections_message(time, "camera", &seen.collect::<Vec<_>>());
+        let odometry = odometry_message(time, "odom", "base_link", &pose.compose(&camera_from_base));
+        [("/odom", time, odometry), ("/detections", time, boxes)]
+    });
+    let topics = [
+        ("/odom", ODOMETRY),
+        ("/detections", DETECTIONS),
+        ("/camera_info", CAMERA_INFO),
+        ("/tf_static", TRANSFORMS),
+    ];
+    recording(&topics, start.into_iter().chain(messages))
+}
+
+#[test]
+fn a_recording_of_ros_gives_the_map_of_its_frames() {
+    let source = block("slam-systems.md", "toml", "drive.mcap");
+    let settings = "association = { type = \"likelihood\" }\nvariance_components = {}\n";
+    let mut frames = frames();
+    let boxes = frames.iter_mut().flat_map(|frame| frame["boxes"].as_array_mut().unwrap());
+    boxes.for_each(|seen| {
+        seen.as_object_mut().unwrap().remove("object");
+    });
+    let lines: String = frames.iter().map(|frame| format!("{frame}\n")).collect();
+    let from_lines =
+        format!("source = {{ type = \"json_lines\", file = \"f.jsonl\", up = [0, 0, 1], {CAMERA} }}");
+    let folder = folder(&[
+        ("ros.toml", &format!("{settings}{source}")),
+        ("lines.toml", &format!("{settings}{from_lines}")),
+        ("f.jsonl", &lines),
+    ]);
+    let ahead = So3::from_quaternion_xyzw([-0.5, 0.5, -0.5, 0.5]).unwrap();
+    let base_from_camera = Se3::new(ahead, Vector3::new(0.2, 0.0, 1.1));
+    let bag = path(&folder, "drive.mcap");
+    std::fs::write(&bag, drive(&frames, &base_from_camera)).unwrap();
+
+    let contents = manifactor(&format!("inspect {bag} --json")).ended(0).json();
+    assert_eq!(contents["topics"]["/odom"]["messages"], frames.len());
+    let found = contents["source"].as_str().unwrap();
+    assert!(
+        found.ends_with(
+            "odometry = \"/odom\", detections = \"/detections\", camera_info = \"/camera_info\" }"
+        )
+    );
+    manifactor(&format!("run {bag}")).ended(2).complains("`manifactor inspect");
+
+    let poses = |document: &str, file: &str| {
+        let out = path(&folder, document);
+        manifactor(&format!("run {} --out {out} --json", path(&folder, &format!("{document}.toml"))))
+            .ended(0);
+        let trajectory = std::fs::read_to_string(format!("{out}/estimate/{file}")).unwrap();
+        let objects = std::fs::read_to_string(format!("{out}/estimate/objects.json")).unwrap();
+        let objects: Vec<Value> = serde_json::from_str(&objects).unwrap();
+        let line = |line: &str| line.split(' ').map(|number| number.parse().unwrap()).collect::<Vec<f64>>();
+        let poses = trajectory.lines().filter(|text| !text.starts_with('#')).map(line).collect::<Vec<_>>();
+        (poses, objects.len())
+    };
+    let ((of_ros, objects), (of_lines, expected)) =
+        (poses("ros", "trajectory.txt"), poses("lines", "trajectory.txt"));
+    assert_eq!((of_ros.len(), objects), (of_lines.len(), expected));
+    assert!(objects >= 12, "{objects}");
+    let differences =
+        of_ros.iter().zip(&of_lines).flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()));
+    assert!(differences.fold(0.0, f64::max) < 1e-5);
+    let (of_body, _) = poses("ros", "body_trajectory.txt");
+    let distance = (0..3).map(|i| (of_body[0][i + 1] - of_ros[0][i + 1]).powi(2)).sum::<f64>().sqrt();
+    assert!((distance - base_from_camera.translation.norm()).abs() < 1e-6, "{distance}");
 }

@@ -61,29 +61,15 @@ fn the_tutorial_maps_the_objects_of_another_camera() {
     std::fs::create_dir_all(&recording).unwrap();
     std::fs::copy(simulation.join("odometry.txt"), recording.join("odometry.txt")).unwrap();
 
-    let classes = write_labels(&simulation.join("detections.csv"), &folder.path().join("labels"));
-    std::fs::write(folder.path().join("classes.txt"), classes.join("\n")).unwrap();
-    std::fs::write(
-        folder.path().join("labels_to_csv.py"),
-        block("tutorial.md", "python", "labels_to_csv.py"),
-    )
-    .unwrap();
-    let mut python = Command::new("python3");
-    let Ok(converted) = python
-        .args(["labels_to_csv.py", "labels", "classes.txt", "800", "600"])
-        .current_dir(folder.path())
-        .output()
-    else {
-        eprintln!("skipped: there is no python3");
-        return;
-    };
-    assert!(converted.status.success(), "{}", String::from_utf8_lossy(&converted.stderr));
-    std::fs::write(recording.join("detections.csv"), converted.stdout).unwrap();
+    let classes = write_labels(&simulation.join("detections.csv"), &recording.join("labels"));
+    std::fs::write(recording.join("classes.txt"), classes.join("\n")).unwrap();
 
     let settings = block("tutorial.md", "toml", "recording");
     let written = "{ fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
     assert!(settings.contains(written));
-    std::fs::write(robot.join("robot.toml"), settings.replace(written, CAMERA)).unwrap();
+    let detections = block("tutorial.md", "text", "format = \"yolo\"");
+    let settings = settings.replace(written, &format!("{CAMERA}\n{detections}"));
+    std::fs::write(robot.join("robot.toml"), settings).unwrap();
     let steps = block("tutorial.md", "sh", "manifactor check");
     for command in steps.lines().filter_map(|line| line.strip_prefix("manifactor ")) {
         let mut binary = Command::new(env!("CARGO_BIN_EXE_manifactor"));
