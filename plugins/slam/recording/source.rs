@@ -18,7 +18,7 @@ mod rectification;
 pub mod stream;
 mod tum;
 
-pub use camera::CameraChoice;
+pub use camera::{CalibrationFile, CameraChoice};
 pub use detections::DetectionsFile;
 pub use interpolation::NoPose;
 pub use json_lines::parse;
@@ -249,6 +249,14 @@ pub enum SourceError {
     /// A recording of ROS 2 without the needed data.
     #[error(transparent)]
     Mcap(#[from] McapError),
+    /// A calibration that cannot be used.
+    #[error("{}: {fault}", file.display())]
+    Calibration {
+        /// The file.
+        file: PathBuf,
+        /// The fault, with the expected form.
+        fault: String,
+    },
     /// A simulation that cannot be run.
     #[error("the simulation cannot be run: {0}")]
     Simulation(String),

@@ -1,6 +1,6 @@
 //! Cameras by name.
 use super::SourceError;
-use manifactor_geometry::AnyCamera;
+use manifactor_geometry::{AnyCamera, Distortion, KannalaBrandt, RadialTangential};
 use manifactor_quadric::Camera;
 use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
@@ -9,6 +9,10 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
+
+mod calibration;
+
+pub use calibration::CalibrationFile;
 
 /// Cameras of TUM RGB-D, 640 × 480, without distortion, as in the paper.
 const PRESETS: [(&str, [f64; 4]); 3] = [
@@ -27,6 +31,8 @@ pub enum CameraChoice {
     Pinhole(Camera),
     /// A camera model by its `type`.
     Model(Arc<dyn AnyCamera>),
+    /// A calibration file of Kalibr, OpenCV, ROS or COLMAP.
+    File(CalibrationFile),
 }
 
 /// Cameras of TUM RGB-D.
@@ -49,7 +55,7 @@ impl<'de> Deserialize<'de> for CameraChoice {
         impl<'de> Visitor<'de> for CameraVisitor {
             type Value = CameraChoice;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the name of a camera, or a table of its fx, fy, cx, cy, width and height, with the `type` of another model than the pinhole")
+                f.write_str("the name of a camera, or a table of its fx, fy, cx, cy, width and height, with the `type` of another model than the pinhole, or the `file` of a calibration")
             }
             fn visit_str<E: de::Error>(self, name: &str) -> Result<CameraChoice, E> {
                 CameraName::deserialize(name.into_deserializer()).map(CameraChoice::Named)
@@ -66,6 +72,7 @@ impl<'de> Deserialize<'de> for CameraChoice {
         manifactor_config::deserialize_with(from, |node| {
             let choice = match node.field("type") {
                 Some(_) => Self::Model(node.try_read()?),
+                None if node.field("file").is_some() => Self::File(node.try_read()?),
                 None => node.try_read::<UntaggedCamera>()?.0,
             };
             Ok(Box::new(choice))
@@ -74,13 +81,54 @@ impl<'de> Deserialize<'de> for CameraChoice {
 }
 
 impl CameraChoice {
-    /// Returns the pinhole camera of the rectified image.
-    pub fn pinhole(&self) -> Camera {
+    /// Returns the pinhole camera of the rectified image, and the model of the images if it is another.
+    ///
+    /// # Errors
+    /// A calibration file that cannot be read.
+    pub(super) fn read(&self, folder: &Path) -> Result<(Camera, Option<Arc<dyn AnyCamera>>), SourceError> {
+        let model = match self {
+            Self::Pinhole(camera) => return Ok((*camera, None)),
+            Self::Named(name) => return Ok((preset(PRESETS[*name as usize].1), None)),
+            Self::Model(model) => Arc::clone(model),
+            Self::File(file) => file.read(folder)?,
+        };
+        Ok((model.pinhole(), Some(model)))
+    }
+
+    /// Returns the calibration file, if there is one.
+    pub(super) fn file(&self) -> Option<&Path> {
         match self {
-            Self::Pinhole(camera) => *camera,
-            Self::Model(model) => model.pinhole(),
-            Self::Named(name) => preset(PRESETS[*name as usize].1),
+            Self::File(calibration) => Some(&calibration.file),
+            _ => None,
         }
+    }
+}
+
+/// Returns a camera with the distortion of a model as ROS, Kalibr or OpenCV name it.
+///
+/// # Errors
+/// An unknown model, or a wrong number of coefficients.
+pub(super) fn with_distortion(
+    camera: Camera,
+    model: &str,
+    coefficients: &[f64],
+) -> Result<Arc<dyn AnyCamera>, String> {
+    if coefficients.iter().all(|coefficient| *coefficient == 0.0) {
+        return Ok(Arc::new(camera));
+    }
+    match model {
+        "plumb_bob" | "radtan" | "rational_polynomial" => {
+            let distortion =
+                Distortion::try_from(coefficients.to_vec()).map_err(|error| error.to_string())?;
+            Ok(Arc::new(RadialTangential::new(camera, distortion)))
+        }
+        "equidistant" | "fisheye" => match *coefficients {
+            [k1, k2, k3, k4] => Ok(Arc::new(KannalaBrandt::new(camera, [k1, k2, k3, k4]))),
+            _ => Err(format!("expected 4 coefficients of `{model}`, got {}", coefficients.len())),
+        },
+        other => Err(format!(
+            "expected the distortion model `plumb_bob` (`radtan`), `rational_polynomial` or `equidistant`, got `{other}`"
+        )),
     }
 }
 
@@ -104,7 +152,7 @@ mod tests {
 
     #[test]
     fn names_and_folders_tell_the_same_camera() {
-        let named = CameraChoice::Named(CameraName::Freiburg2).pinhole();
+        let named = CameraChoice::Named(CameraName::Freiburg2).read(Path::new("")).unwrap().0;
         assert_eq!(named.fx, 520.9);
         assert_eq!(by_folder(Path::new("x/rgbd_dataset_freiburg2_desk")).unwrap(), named);
         assert!(by_folder(Path::new("x/desk")).unwrap_err().to_string().contains("freiburg1, freiburg2"));

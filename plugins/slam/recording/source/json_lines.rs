@@ -98,7 +98,8 @@ impl SequenceSource for JsonLines {
     }
 
     fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
-        check_files(&folders.document, &[self.file.as_deref(), self.ground_truth.as_deref()])
+        let files = [self.file.as_deref(), self.ground_truth.as_deref(), self.camera.file()];
+        check_files(&folders.document, &files)
     }
 
     fn may_have_up(&self) -> bool {
@@ -119,7 +120,7 @@ impl JsonLines {
         if let (Some(extrinsics), Some(truth)) = (extrinsics, &mut ground_truth) {
             extrinsics.apply_to_ground_truth(truth);
         }
-        let lens = Rectification::new(&self.camera, None)?;
+        let lens = Rectification::new(&self.camera, None, &folders.document)?;
         let opening = SequenceHeader {
             camera: lens.camera,
             body_from_camera: self.body_from_camera,

@@ -1,13 +1,13 @@
 use super::assemble::{
     MatchedDetections, TimeMatching, default_share, is_default_share, match_by_time, read_ground_truth,
 };
-use super::camera::CameraChoice;
+use super::camera::{CameraChoice, with_distortion};
 use super::extrinsics::Extrinsics;
 use super::rectification::Rectification;
 use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::{ClassScores, Detection, Sequence, UnusedInput};
 use manifactor_formats::tum::StampedPose;
-use manifactor_geometry::{AnyCamera, Distortion, KannalaBrandt, RadialTangential, Se3};
+use manifactor_geometry::Se3;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::{BoundingBox, Camera};
@@ -17,7 +17,6 @@ use recorded_messages::{BoxesOfImage, RecordedMessages};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 mod recorded_messages;
 
@@ -199,7 +198,7 @@ impl SequenceSource for Mcap {
             None => None,
         };
         let messages = RecordedMessages::read(self, &file)?;
-        let lens = self.camera(&file, &messages)?;
+        let lens = self.camera(&file, &messages, folders)?;
         let (poses, body_from_camera) = self.camera_poses(&file, &messages)?;
         if let (Some(pose), Some(truth)) = (body_from_camera, &mut ground_truth) {
             Extrinsics::new(pose).apply_to_ground_truth(truth);
@@ -235,7 +234,8 @@ impl SequenceSource for Mcap {
     }
 
     fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
-        let others = [Some(self.file.as_path()), self.ground_truth.as_deref()];
+        let camera = self.camera.as_ref().and_then(CameraChoice::file);
+        let others = [Some(self.file.as_path()), self.ground_truth.as_deref(), camera];
         let rows = self.detections_file.iter().flat_map(DetectionsFile::files);
         let files: Vec<_> = others.into_iter().chain(rows.map(Some)).collect();
         check_files(&folders.document, &files)
@@ -289,9 +289,14 @@ impl Mcap {
     }
 
     /// Returns the camera of the boxes.
-    fn camera(&self, file: &Path, messages: &RecordedMessages) -> Result<Rectification, SourceError> {
+    fn camera(
+        &self,
+        file: &Path,
+        messages: &RecordedMessages,
+        folders: &InputFolders,
+    ) -> Result<Rectification, SourceError> {
         if let Some(choice) = &self.camera {
-            return Rectification::new(choice, None);
+            return Rectification::new(choice, None, &folders.document);
         }
         let Some((topic, info)) = &messages.camera else {
             // `read` has made sure that there is a topic; it has no message that can be decoded
@@ -408,23 +413,10 @@ fn camera_of(info: &CameraInfo, is_rectified: bool) -> Result<Rectification, Str
     if is_rectified || d.iter().all(|coefficient| *coefficient == 0.0) {
         return Ok(Rectification::of_pinhole(camera, None));
     }
-    let model: Arc<dyn AnyCamera> = match distortion_model.as_str() {
-        "plumb_bob" | "radtan" | "rational_polynomial" => {
-            let distortion = Distortion::try_from(d.clone()).map_err(|error| error.to_string())?;
-            Arc::new(RadialTangential::new(camera, distortion))
-        }
-        "equidistant" | "fisheye" => match d[..] {
-            [k1, k2, k3, k4] => Arc::new(KannalaBrandt::new(camera, [k1, k2, k3, k4])),
-            _ => return Err(format!("expected 4 coefficients of `{distortion_model}`, got {}", d.len())),
-        },
-        other => {
-            return Err(format!(
-                "expected the distortion model `plumb_bob`, `rational_polynomial` or `equidistant`, got `{other}`; for boxes \
-                 in the rectified image set `source.rectified = true`"
-            ));
-        }
-    };
-    Rectification::new(&CameraChoice::Model(model), None).map_err(|error| error.to_string())
+    let hint = "for boxes in the rectified image set `source.rectified = true`";
+    with_distortion(camera, distortion_model, d)
+        .map(Rectification::of_model)
+        .map_err(|fault| format!("{fault}; {hint}"))
 }
 
 #[cfg(test)]

@@ -83,7 +83,7 @@ fn exact() -> NotNegative {
 impl SequenceSource for RecordedFiles {
     fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.folder, "source.folder")?;
-        let lens = Rectification::new(&self.camera, self.distortion)?;
+        let lens = Rectification::new(&self.camera, self.distortion, &folders.document)?;
         let by = TimeMatching {
             within: self.max_time_difference,
             without_pose: self.max_without_pose,
@@ -118,7 +118,8 @@ impl SequenceSource for RecordedFiles {
         let folder = folders.data_set(&self.folder, "source.folder")?;
         let others = [Some(self.odometry.as_path()), self.ground_truth.as_deref(), self.objects.as_deref()];
         let files: Vec<_> = self.detections.files().into_iter().map(Some).chain(others).collect();
-        check_files(&folder, &files)
+        check_files(&folder, &files)?;
+        check_files(&folders.document, &[self.camera.file()])
     }
 
     fn may_have_up(&self) -> bool {

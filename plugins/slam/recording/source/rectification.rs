@@ -7,6 +7,7 @@ use crate::sequence::{Detection, Observation, UnusedInput};
 use manifactor_geometry::{AnyCamera, Distortion, RadialTangential};
 use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::Vector2;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Mapping from the images of a camera to the images of its pinhole camera.
@@ -19,18 +20,26 @@ pub(super) struct Rectification {
 }
 
 impl Rectification {
-    /// Creates the rectification for a source's camera, with an optional distortion of its lens.
+    /// Creates the rectification for a source's camera, with an optional distortion of its lens. A calibration file is
+    /// relative to `folder`.
     ///
     /// # Errors
-    /// If a model that has its own distortion is combined with a second one.
-    pub(super) fn new(choice: &CameraChoice, distortion: Option<Distortion>) -> Result<Self, SourceError> {
-        match (choice, distortion) {
-            (CameraChoice::Model(_), Some(_)) => Err(SourceError::DistortedTwice),
-            (CameraChoice::Model(model), None) => {
-                Ok(Self { camera: model.pinhole(), model: Some(Arc::clone(model)) })
-            }
-            (choice, distortion) => Ok(Self::of_pinhole(choice.pinhole(), distortion)),
+    /// If a model that has its own distortion is combined with a second one, or a file cannot be read.
+    pub(super) fn new(
+        choice: &CameraChoice,
+        distortion: Option<Distortion>,
+        folder: &Path,
+    ) -> Result<Self, SourceError> {
+        match (choice.read(folder)?, distortion) {
+            ((_, Some(_)), Some(_)) => Err(SourceError::DistortedTwice),
+            ((_, Some(model)), None) => Ok(Self::of_model(model)),
+            ((camera, None), distortion) => Ok(Self::of_pinhole(camera, distortion)),
         }
+    }
+
+    /// Creates the rectification for a camera model.
+    pub(super) fn of_model(model: Arc<dyn AnyCamera>) -> Self {
+        Self { camera: model.pinhole(), model: Some(model) }
     }
 
     /// Creates the rectification for a pinhole camera, with an optional distortion of its lens.
@@ -96,7 +105,7 @@ mod tests {
     /// Returns the calibration of freiburg1, as the benchmark publishes it.
     fn freiburg1(distortion: [f64; 5]) -> Rectification {
         let named = serde_json::from_value::<CameraChoice>("freiburg1".into()).unwrap();
-        Rectification::new(&named, Some(distortion.into())).unwrap()
+        Rectification::new(&named, Some(distortion.into()), Path::new("")).unwrap()
     }
 
     const LENS: [f64; 5] = [0.2624, -0.9531, -0.0054, 0.0026, 1.1633];
@@ -122,11 +131,14 @@ mod tests {
         numbers["distortion"] = LENS.to_vec().into();
         let named: CameraChoice = serde_json::from_value(numbers).unwrap();
         let seen = BoundingBox::new([20.0, 30.0, 120.0, 200.0]).unwrap();
-        let model = Rectification::new(&named, None).unwrap();
+        let model = Rectification::new(&named, None, Path::new("")).unwrap();
         let of = |lens: &Rectification| rectified(&**lens.model.as_ref().unwrap(), &seen);
         assert_eq!(of(&model), of(&lens));
         assert_eq!(model.camera, lens.camera);
-        assert!(matches!(Rectification::new(&named, Some(LENS.into())), Err(SourceError::DistortedTwice)));
+        assert!(matches!(
+            Rectification::new(&named, Some(LENS.into()), Path::new("")),
+            Err(SourceError::DistortedTwice)
+        ));
     }
 
     #[test]

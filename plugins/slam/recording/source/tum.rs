@@ -67,7 +67,7 @@ impl SequenceSource for TumRgbd {
     fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.sequence, "source.sequence")?;
         let lens = match &self.camera {
-            Some(choice) => Rectification::new(choice, self.distortion)?,
+            Some(choice) => Rectification::new(choice, self.distortion, &folders.document)?,
             None => Rectification::of_pinhole(by_folder(&folder)?, self.distortion),
         };
         let by = TimeMatching {
@@ -102,7 +102,8 @@ impl SequenceSource for TumRgbd {
         let folder = folders.data_set(&self.sequence, "source.sequence")?;
         let others = [Some(self.odometry.as_path()), self.ground_truth.as_deref()];
         let files: Vec<_> = self.detections.files().into_iter().map(Some).chain(others).collect();
-        check_files(&folder, &files)
+        check_files(&folder, &files)?;
+        check_files(&folders.document, &[self.camera.as_ref().and_then(CameraChoice::file)])
     }
 
     fn may_have_up(&self) -> bool {

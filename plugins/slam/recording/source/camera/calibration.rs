@@ -1,0 +1,307 @@
+//! Calibration files of other programs.
+use super::with_distortion;
+use crate::source::SourceError;
+use manifactor_config::{Document, Errors, Format, Value};
+use manifactor_formats::read_text;
+use manifactor_geometry::{AnyCamera, Camera, DoubleSphere, ExtendedUnified};
+use manifactor_graph::checked::{Positive, Share};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A calibration file: the YAML file of Kalibr (a chain of cameras), OpenCV or ROS, or `cameras.txt` of COLMAP.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CalibrationFile {
+    /// Path of the file, relative to the document.
+    pub file: PathBuf,
+    /// The camera in the file, such as `cam0` or an id of COLMAP. Default: the only one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+}
+
+/// A camera of a file with its name.
+type NamedCamera = (String, Result<Arc<dyn AnyCamera>, String>);
+
+/// A camera in the form of Kalibr.
+#[derive(Deserialize)]
+struct KalibrCamera {
+    camera_model: String,
+    intrinsics: Vec<f64>,
+    #[serde(default)]
+    distortion_model: Option<String>,
+    #[serde(default)]
+    distortion_coeffs: Vec<f64>,
+    resolution: [u32; 2],
+}
+
+/// A matrix in the form of OpenCV and ROS.
+#[derive(Deserialize)]
+struct Matrix {
+    data: Vec<f64>,
+}
+
+/// A camera in the form of OpenCV and ROS.
+#[derive(Deserialize)]
+struct OpenCvCamera {
+    image_width: u32,
+    image_height: u32,
+    camera_matrix: Matrix,
+    #[serde(alias = "distortion_coeffs", alias = "dist_coeffs")]
+    distortion_coefficients: Matrix,
+    #[serde(default)]
+    distortion_model: Option<String>,
+}
+
+impl CalibrationFile {
+    /// Reads the camera.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a camera that is not in it, or a model that is not supported.
+    pub(in crate::source) fn read(&self, folder: &Path) -> Result<Arc<dyn AnyCamera>, SourceError> {
+        let file = folder.join(&self.file);
+        let text = read_text(&file)?;
+        let fault = |fault: String| SourceError::Calibration { file: file.clone(), fault };
+        let cameras = if file.extension().is_some_and(|extension| extension == "txt") {
+            colmap(&text).map_err(fault)?
+        } else {
+            yaml(&file, &text)?
+        };
+        let names = || cameras.iter().map(|(name, _)| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        let found = match &self.name {
+            Some(wanted) => cameras
+                .iter()
+                .find(|(name, _)| name == wanted)
+                .ok_or_else(|| fault(format!("there is no camera `{wanted}`; there are {}", names())))?,
+            None => match &cameras[..] {
+                [only] => only,
+                [] => {
+                    return Err(fault(
+                        "expected the cameras of Kalibr, OpenCV, ROS or COLMAP, found none".into(),
+                    ));
+                }
+                _ => {
+                    return Err(fault(format!(
+                        "there are several cameras: set `name` to one of {}",
+                        names()
+                    )));
+                }
+            },
+        };
+        let (name, camera) = found;
+        camera.clone().map_err(|reason| fault(format!("camera `{name}`: {reason}")))
+    }
+}
+
+/// Returns the cameras of Kalibr, OpenCV or ROS.
+fn yaml(file: &Path, text: &str) -> Result<Vec<NamedCamera>, SourceError> {
+    // OpenCV writes a directive and tags that are not in the standard
+    let lines = text.lines().filter(|line| !line.starts_with("%YAML"));
+    let plain = lines.map(|line| line.replace("!!opencv-matrix", "")).collect::<Vec<_>>().join("\n");
+    let document = Document::parse(file.display().to_string(), plain, Format::Yaml)?;
+    let root = document.root();
+    let errors = Errors::new();
+    if root.field("camera_matrix").is_some() {
+        let read = root.read::<OpenCvCamera>(&errors);
+        let camera = errors.finish(read)?;
+        let name = root.field("camera_name").and_then(|name| name.try_read::<String>().ok());
+        return Ok(vec![(name.unwrap_or_else(|| "camera".into()), opencv(&camera))]);
+    }
+    let Value::Table(table) = &root.value else { return Ok(vec![]) };
+    let mut cameras = vec![];
+    for (name, field) in table.iter().filter(|(_, field)| field.node.field("camera_model").is_some()) {
+        if let Some(camera) = field.node.read::<KalibrCamera>(&errors) {
+            cameras.push((name.clone(), kalibr(&camera)));
+        }
+    }
+    Ok(errors.finish(Some(cameras))?)
+}
+
+fn opencv(camera: &OpenCvCamera) -> Result<Arc<dyn AnyCamera>, String> {
+    let OpenCvCamera { image_width, image_height, camera_matrix, distortion_coefficients, distortion_model } =
+        camera;
+    let [fx, _, cx, _, fy, cy, ..] = camera_matrix.data[..] else {
+        return Err(format!("expected 9 numbers in `camera_matrix`, got {}", camera_matrix.data.len()));
+    };
+    let pinhole =
+        Camera::new([fx, fy, cx, cy], *image_width, *image_height).map_err(|error| error.to_string())?;
+    let model = distortion_model.as_deref().unwrap_or("plumb_bob");
+    with_distortion(pinhole, model, &distortion_coefficients.data)
+}
+
+fn kalibr(camera: &KalibrCamera) -> Result<Arc<dyn AnyCamera>, String> {
+    let KalibrCamera { camera_model, intrinsics, distortion_model, distortion_coeffs, resolution } = camera;
+    let [width, height] = *resolution;
+    let pinhole = |numbers: [f64; 4]| Camera::new(numbers, width, height).map_err(|error| error.to_string());
+    let is_distorted = distortion_model.as_deref().is_some_and(|model| model != "none");
+    let text = |error: &dyn std::fmt::Display| error.to_string();
+    match (camera_model.as_str(), &intrinsics[..]) {
+        ("pinhole", [fx, fy, cx, cy]) => {
+            let model = distortion_model.as_deref().unwrap_or("none");
+            with_distortion(pinhole([*fx, *fy, *cx, *cy])?, model, distortion_coeffs)
+        }
+        ("ds" | "eucm" | "omni", _) if is_distorted => {
+            Err(format!("`{camera_model}` with a distortion is not supported: calibrate it with `none`"))
+        }
+        ("ds", [xi, alpha, fx, fy, cx, cy]) => {
+            let alpha = Share::new(*alpha).map_err(|error| text(&error))?;
+            let camera = DoubleSphere::new(pinhole([*fx, *fy, *cx, *cy])?, *xi, alpha);
+            Ok(Arc::new(camera.map_err(|error| text(&error))?))
+        }
+        ("eucm", [alpha, beta, fx, fy, cx, cy]) => {
+            let alpha = Share::new(*alpha).map_err(|error| text(&error))?;
+            let beta = Positive::new(*beta).map_err(|error| text(&error))?;
+            Ok(Arc::new(ExtendedUnified::new(pinhole([*fx, *fy, *cx, *cy])?, alpha, beta)))
+        }
+        // the focal lengths of the unified model refer to the sphere
+        ("omni", [xi, fx, fy, cx, cy]) if *xi >= 0.0 => {
+            let alpha = Share::new(xi / (1.0 + xi)).map_err(|error| text(&error))?;
+            let camera = pinhole([fx / (1.0 + xi), fy / (1.0 + xi), *cx, *cy])?;
+            Ok(Arc::new(ExtendedUnified::new(camera, alpha, Positive::literal(1.0))))
+        }
+        ("pinhole" | "ds" | "eucm" | "omni", numbers) => {
+            Err(format!("unexpected number of `intrinsics` for `{camera_model}`: {}", numbers.len()))
+        }
+        (other, _) => Err(format!("expected the model `pinhole`, `omni`, `ds` or `eucm`, got `{other}`")),
+    }
+}
+
+/// Returns the cameras of COLMAP's `cameras.txt`: lines `id model width height parameters`.
+fn colmap(text: &str) -> Result<Vec<NamedCamera>, String> {
+    let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
+    let rows = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    rows.map(|(number, line)| {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let [id, model, width, height, ref parameters @ ..] = words[..] else {
+            return Err(format!("line {number}: expected `id model width height parameters`, got `{line}`"));
+        };
+        let parse = |word: &str| {
+            word.parse::<f64>().map_err(|_| format!("line {number}: expected a number, got `{word}`"))
+        };
+        let size = |word: &str| {
+            word.parse::<u32>().map_err(|_| format!("line {number}: expected pixels, got `{word}`"))
+        };
+        let [width, height] = [size(width)?, size(height)?];
+        let parameters = parameters.iter().map(|word| parse(word)).collect::<Result<Vec<f64>, _>>()?;
+        Ok((id.to_owned(), colmap_camera(model, [width, height], &parameters)))
+    })
+    .collect()
+}
+
+fn colmap_camera(
+    model: &str,
+    [width, height]: [u32; 2],
+    parameters: &[f64],
+) -> Result<Arc<dyn AnyCamera>, String> {
+    let with = |numbers: [f64; 4], distortion: &str, coefficients: &[f64]| {
+        let camera = Camera::new(numbers, width, height).map_err(|error| error.to_string())?;
+        with_distortion(camera, distortion, coefficients)
+    };
+    match (model, parameters) {
+        ("SIMPLE_PINHOLE", [f, cx, cy]) => with([*f, *f, *cx, *cy], "none", &[]),
+        ("PINHOLE", [fx, fy, cx, cy]) => with([*fx, *fy, *cx, *cy], "none", &[]),
+        ("SIMPLE_RADIAL", [f, cx, cy, k]) => with([*f, *f, *cx, *cy], "plumb_bob", &[*k, 0.0, 0.0, 0.0]),
+        ("RADIAL", [f, cx, cy, k1, k2]) => with([*f, *f, *cx, *cy], "plumb_bob", &[*k1, *k2, 0.0, 0.0]),
+        ("OPENCV", [fx, fy, cx, cy, k @ ..]) if k.len() == 4 => with([*fx, *fy, *cx, *cy], "plumb_bob", k),
+        ("FULL_OPENCV", [fx, fy, cx, cy, k @ ..]) if k.len() == 8 => {
+            with([*fx, *fy, *cx, *cy], "plumb_bob", k)
+        }
+        ("OPENCV_FISHEYE", [fx, fy, cx, cy, k @ ..]) if k.len() == 4 => {
+            with([*fx, *fy, *cx, *cy], "equidistant", k)
+        }
+        (
+            "SIMPLE_PINHOLE" | "PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV" | "FULL_OPENCV"
+            | "OPENCV_FISHEYE",
+            _,
+        ) => Err(format!("unexpected number of parameters for {model}: {}", parameters.len())),
+        _ => Err(format!(
+            "expected the model SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV or OPENCV_FISHEYE, got {model}"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector2;
+
+    fn read(name: &str, text: &str, camera: Option<&str>) -> Result<Arc<dyn AnyCamera>, String> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(name), text).unwrap();
+        let file = CalibrationFile { file: name.into(), name: camera.map(str::to_owned) };
+        file.read(folder.path()).map_err(|error| error.to_string())
+    }
+
+    const KALIBR: &str = "\
+cam0:
+  camera_model: pinhole
+  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]
+  distortion_model: radtan
+  intrinsics: [458.7, 457.3, 367.2, 248.4]
+  resolution: [752, 480]
+  rostopic: /cam0/image_raw
+cam1:
+  camera_model: ds
+  distortion_coeffs: []
+  distortion_model: none
+  intrinsics: [-0.27, 0.57, 364.8, 364.7, 512.2, 514.1]
+  resolution: [1024, 1024]
+cam2:
+  camera_model: omni
+  distortion_model: none
+  intrinsics: [1.4, 900.0, 900.0, 512.0, 512.0]
+  resolution: [1024, 1024]
+";
+
+    #[test]
+    fn cameras_of_kalibr_are_read_by_name() {
+        let radtan = read("chain.yaml", KALIBR, Some("cam0")).unwrap();
+        assert_eq!((radtan.pinhole().fx, radtan.pinhole().width), (458.7, 752));
+        let moved = radtan.rectify(&Vector2::new(100.0, 100.0)).unwrap() - Vector2::new(100.0, 100.0);
+        assert!((10.0..60.0).contains(&moved.norm()), "{moved}");
+        assert!(
+            format!("{:?}", read("chain.yaml", KALIBR, Some("cam1")).unwrap()).starts_with("DoubleSphere")
+        );
+        let omni = read("chain.yaml", KALIBR, Some("cam2")).unwrap();
+        assert!((omni.pinhole().fx - 375.0).abs() < 1e-9);
+        let error = read("chain.yaml", KALIBR, None).unwrap_err();
+        assert!(error.contains("several cameras: set `name` to one of `cam0`, `cam1`, `cam2`"), "{error}");
+        let error = read("chain.yaml", KALIBR, Some("cam3")).unwrap_err();
+        assert!(error.contains("there is no camera `cam3`"), "{error}");
+        let wrong = KALIBR.replace("camera_model: ds", "camera_model: fov");
+        let error = read("chain.yaml", &wrong, Some("cam1")).unwrap_err();
+        assert!(error.contains("`cam1`: expected the model `pinhole`"), "{error}");
+        let error = read("chain.yaml", &KALIBR.replace("[752, 480]", "752"), Some("cam0")).unwrap_err();
+        assert!(error.contains("resolution") || error.contains("chain.yaml"), "{error}");
+    }
+
+    #[test]
+    fn cameras_of_opencv_and_ros_are_read() {
+        let opencv = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 517.3, 0., 318.6, 0., 516.5, 255.3, 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   data: [ 0.26, -0.95, -0.005, 0.003, 1.16 ]\n";
+        let camera = read("left.yml", opencv, None).unwrap();
+        assert_eq!((camera.pinhole().fy, camera.pinhole().cy), (516.5, 255.3));
+        let ros = "image_width: 848\nimage_height: 800\ncamera_name: wide\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [285.7, 0, 425.5, 0, 286.9, 384.2, 0, 0, 1]\ndistortion_model: equidistant\ndistortion_coefficients:\n  rows: 1\n  cols: 4\n  data: [-0.005, 0.04, -0.04, 0.006]\n";
+        assert!(format!("{:?}", read("wide.yaml", ros, None).unwrap()).starts_with("KannalaBrandt"));
+        let error = read("wide.yaml", &ros.replace("equidistant", "fov"), None).unwrap_err();
+        assert!(error.contains("camera `wide`: expected the distortion model"), "{error}");
+    }
+
+    #[test]
+    fn cameras_of_colmap_are_read_by_id() {
+        let text = "# id model width height parameters\n1 SIMPLE_RADIAL 800 600 500 400 300 0.05\n7 OPENCV_FISHEYE 848 800 285 286 425 384 0.01 0.02 0 0\n";
+        let radial = read("cameras.txt", text, Some("1")).unwrap();
+        assert_eq!((radial.pinhole().fx, radial.pinhole().fy, radial.pinhole().cx), (500.0, 500.0, 400.0));
+        assert!(format!("{:?}", read("cameras.txt", text, Some("7")).unwrap()).starts_with("KannalaBrandt"));
+        for (wrong, words) in [
+            ("1 SIMPLE_RADIAL 800 600 500 400 300\n", "number of parameters"),
+            ("1 FOV 800 600 500 500 400 300 0.9\n", "got FOV"),
+            ("1 PINHOLE 800\n", "line 1: expected `id model"),
+            ("1 PINHOLE 800 600 500 x 400 300\n", "line 1: expected a number, got `x`"),
+            ("1 PINHOLE 800 600 -500 500 400 300\n", "expected fx"),
+        ] {
+            let error = read("cameras.txt", wrong, None).unwrap_err();
+            assert!(error.contains(words) && error.contains("cameras.txt"), "{error}");
+        }
+    }
+}
