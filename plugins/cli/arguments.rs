@@ -40,6 +40,7 @@ Examples:
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    #[command(visible_alias = "map")]
     Run(Run),
     Online(Online),
     Plot(Plot),

@@ -6,6 +6,7 @@ pub(crate) mod document;
 pub(crate) mod graph_file;
 pub(crate) mod kind;
 pub(crate) mod pictures;
+pub(crate) mod recording;
 pub(crate) mod run_file;
 pub(crate) mod solver;
 pub(crate) mod what_if;

@@ -207,7 +207,8 @@ mod tests {
     #[test]
     fn a_damaged_message_is_refused() {
         let faults = [
-            ("float64[] x", Cdr::new().u32(u32::MAX).bytes(), "a list of 4294967295 elements"),
+            ("float64[] x", Cdr::new().u32(u32::MAX).bytes(), "sequence length 4294967295"),
+            ("float64[] x", Cdr::new().u32(99).bytes(), "a list of 99 elements in 0 remaining bytes"),
             ("Test x\n===\nMSG: test_msgs/Test\nTest x", Cdr::new().u8(1).bytes(), "more than 32 deep"),
             ("Other x", Cdr::new().u8(1).bytes(), "`test_msgs/Other` is not defined"),
             ("float64 x", Cdr::new().u8(1).bytes(), ""),

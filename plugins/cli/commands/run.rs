@@ -20,12 +20,16 @@ use std::path::PathBuf;
 
 /// Build, solve and evaluate the run that a document describes, and write the results.
 ///
+/// An MCAP recording of ROS 2 needs no document: its settings are guessed from its topics, and printed.
+///
 /// Each variant of the run has a folder with its settings, trajectory, objects, frames, graph, iterations
 /// and metrics, the map as PLY, and pictures as SVG and PNG (the map from above and from the side, errors
 /// and poses over time, residuals, cost, images). report.html shows everything, with the map in 3D, and
 /// needs no network. `manifactor plot` draws the pictures again.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  manifactor run examples/desk/desk.toml --out out/desk")]
+#[command(
+    after_help = "Examples:\n  manifactor run examples/desk/desk.toml --out out/desk\n  manifactor map drive.mcap"
+)]
 pub(crate) struct Run {
     #[command(flatten)]
     pub(crate) options: RunOptions,

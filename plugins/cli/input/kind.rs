@@ -141,7 +141,7 @@ impl InputKind {
                  see `manifactor explain recorded`"
             ),
             Self::Mcap => format!(
-                "`manifactor inspect {path}` lists its topics, and the `source` with which `manifactor run RUN.toml` maps it"
+                "`manifactor run {path}` maps it, `manifactor inspect {path}` lists its topics"
             ),
         }
     }

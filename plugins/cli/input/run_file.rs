@@ -1,6 +1,7 @@
 //! Arguments for the document of a run.
 use crate::failure::Failure;
-use crate::input::{document, kind};
+use crate::input::kind::{self, InputKind};
+use crate::input::{document, recording};
 use clap::Args;
 use manifactor::config::Document;
 use manifactor::slam::run_document::RunDocument;
@@ -9,7 +10,8 @@ use std::path::{Path, PathBuf};
 /// Arguments of all commands that read a run's document.
 #[derive(Debug, Args)]
 pub(crate) struct RunArguments {
-    /// The document that describes the run; `-` reads TOML or JSON from standard input.
+    /// The document that describes the run, or an MCAP recording, whose settings are guessed; `-` reads TOML or
+    /// JSON from standard input.
     pub(crate) config: PathBuf,
     /// Set a value of the document, such as `solver.stop.max_iterations=50` or `source.seed=2`.
     #[arg(long, value_name = "KEY=VALUE")]
@@ -22,6 +24,9 @@ pub(crate) struct RunArguments {
 impl RunArguments {
     /// Reads the document.
     pub(crate) fn open(&self) -> Result<RunDocument, Failure> {
+        if InputKind::of_extension(&self.config) == Some(InputKind::Mcap) {
+            return self.read(recording::document(&self.config)?);
+        }
         self.read(document::open(&self.config, kind::RUN)?)
     }
 

@@ -263,8 +263,9 @@ mod tests {
             serde_json::to_string(&serde_json::from_str::<OnBody>(&written).unwrap()).unwrap(),
             written
         );
-        let error =
-            read(r#""factor": {"type": "between_point2", "relative": [1, 0]}"#).unwrap_err().to_string();
+        let error = read(r#""factor": {"type": "between_point2", "relative": {"position": [1, 0]}}"#)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("point2, point2"), "{error}");
         let error = read(&format!(r#"{between}, "poses": [2]"#)).unwrap_err().to_string();
         assert!(error.contains("names variable 2"), "{error}");

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import os
 
-from . import errors, factors, functions, losses, solvers, starts, types, variables
+from . import detections, errors, factors, functions, losses, solvers, starts, types, variables
 from ._native import FactorId, Graph, Noise, Smoother, Solution, Values, __version__, solve
 from ._native import read as _read
 from .algebra import ValueArray
@@ -68,6 +68,7 @@ __all__ = [
     "auto",
     "batch",
     "check_factor",
+    "detections",
     "dogleg",
     "enable_logging",
     "errors",

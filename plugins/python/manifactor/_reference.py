@@ -18,7 +18,7 @@ FULL = {
     "Runs and experiments": ["report.py", "frames.py", "logs.py"],
 }
 #: Modules that a user imports by name.
-MODULES = {"manifactor.errors": "errors.py", "manifactor.ray": "ray.py"}
+MODULES = {"manifactor.detections": "detections.py", "manifactor.errors": "errors.py", "manifactor.ray": "ray.py"}
 #: Generated modules, with one line for each constructor.
 BRIEF = {
     "Variables": "variables.py",

@@ -1,4 +1,5 @@
 //! The help of every command: its width, and its examples.
+use super::slam_systems::recording_of_desk;
 use crate::{manifactor, root};
 use clap::{Command, CommandFactory};
 use unicode_width::UnicodeWidthStr;
@@ -38,12 +39,16 @@ fn help_fits_into_80_columns() {
 #[cfg(unix)]
 fn the_examples_of_the_help_work() {
     assert!(!examples(&manifactor_cli::Cli::command()).is_empty());
+    let drive = recording_of_desk();
     for (name, command) in commands() {
         let examples = examples(&command);
         assert!(examples.iter().any(|line| line.starts_with(&name)), "{name} has no example: {examples:?}");
         let folder = tempfile::tempdir().unwrap();
         for data in ["examples", "tests"] {
             std::os::unix::fs::symlink(root().join(data), folder.path().join(data)).unwrap();
+        }
+        if examples.iter().any(|line| line.contains("drive.mcap")) {
+            std::fs::write(folder.path().join("drive.mcap"), &drive).unwrap();
         }
         for line in examples {
             let words = line.split(" > ").next().unwrap().split_whitespace();

@@ -82,6 +82,17 @@ fn drive(frames: &[Value], base_from_camera: &Se3) -> Vec<u8> {
     recording(&topics, start.into_iter().chain(messages))
 }
 
+/// Pose of a camera that looks ahead.
+fn base_from_camera() -> Se3 {
+    let ahead = So3::from_quaternion_xyzw([-0.5, 0.5, -0.5, 0.5]).unwrap();
+    Se3::new(ahead, Vector3::new(0.2, 0.0, 1.1))
+}
+
+/// The simulated desk as a robot records it.
+pub(super) fn recording_of_desk() -> Vec<u8> {
+    drive(&frames(), &base_from_camera())
+}
+
 #[test]
 fn a_recording_of_ros_gives_the_map_of_its_frames() {
     let source = block("slam-systems.md", "toml", "drive.mcap");
@@ -99,20 +110,19 @@ fn a_recording_of_ros_gives_the_map_of_its_frames() {
         ("lines.toml", &format!("{settings}{from_lines}")),
         ("f.jsonl", &lines),
     ]);
-    let ahead = So3::from_quaternion_xyzw([-0.5, 0.5, -0.5, 0.5]).unwrap();
-    let base_from_camera = Se3::new(ahead, Vector3::new(0.2, 0.0, 1.1));
+    let base_from_camera = base_from_camera();
     let bag = path(&folder, "drive.mcap");
     std::fs::write(&bag, drive(&frames, &base_from_camera)).unwrap();
 
     let contents = manifactor(&format!("inspect {bag} --json")).ended(0).json();
     assert_eq!(contents["topics"]["/odom"]["messages"], frames.len());
     let found = contents["source"].as_str().unwrap();
-    assert!(
-        found.ends_with(
-            "odometry = \"/odom\", detections = \"/detections\", camera_info = \"/camera_info\" }"
-        )
-    );
-    manifactor(&format!("run {bag}")).ended(2).complains("`manifactor inspect");
+    let topics = r#"odometry = "/odom", detections = "/detections", camera_info = "/camera_info", up = [0.0, 0.0, 1.0] }"#;
+    assert!(found.ends_with(topics), "{found}");
+    manifactor(&format!("solve {bag}")).ended(2).complains("`manifactor inspect");
+    let guessed = manifactor(&format!("map {bag} --out {} --json", path(&folder, "guessed"))).ended(0);
+    assert!(guessed.stderr.contains(topics), "{}", guessed.stderr);
+    assert!(guessed.json()["variants"][0]["counts"]["objects"].as_u64().unwrap() >= 12);
 
     let poses = |document: &str, file: &str| {
         let out = path(&folder, document);

@@ -59,6 +59,9 @@ impl Extrinsics {
     /// Returns the noise of a step of the camera from that of the body: with the step S and the extrinsics E,
     /// E⁻¹ S exp(δ) E = E⁻¹ S E exp(Ad(E⁻¹) δ).
     fn noise(&self, noise: &Noise) -> Result<Noise, String> {
+        if noise.observed().is_some_and(|rows| rows.contains(&false)) {
+            return Err("expected a noise of all six rows, to convert it from the body to the camera".into());
+        }
         let information = noise.information_matrix(Se3::TANGENT.len()).map_err(|error| error.to_string())?;
         let step = self.body_from_camera.adjoint();
         let information = step.transpose() * information * step;
@@ -134,7 +137,7 @@ mod tests {
         extrinsics().apply_to_frame(&mut observation);
         let faults: Vec<String> = observation.unused.iter().map(|unused| format!("{unused:?}")).collect();
         assert_eq!(faults.len(), 2, "{faults:?}");
-        assert!(faults[0].contains("odometry_noise") && faults[1].contains("names variable 2"), "{faults:?}");
+        assert!(faults[0].contains("all six rows") && faults[1].contains("names variable 2"), "{faults:?}");
         let names: Vec<_> =
             observation.pose_graph.factors.iter().map(|factor| factor.factor.typetag_name()).collect();
         assert_eq!(names, ["on_body", "between_se3"]);
