@@ -121,13 +121,10 @@ impl Contents {
         Ok(Self { topics, fault })
     }
 
-    /// Returns the names of the topics with a use.
-    pub fn with_role(&self, role: Role) -> Vec<&str> {
-        self.topics
-            .iter()
-            .filter(|(_, topic)| topic.role == Some(role))
-            .map(|(name, _)| name.as_str())
-            .collect()
+    /// Returns the topics with a use, sorted by name.
+    pub fn with_role(&self, role: Role) -> Vec<(&str, &TopicContents)> {
+        let topics = self.topics.iter().filter(|(_, topic)| topic.role == Some(role));
+        topics.map(|(name, topic)| (name.as_str(), topic)).collect()
     }
 }
 
@@ -153,7 +150,7 @@ mod tests {
         assert_eq!((contents.topics["/chatter"].messages, contents.topics["/chatter"].role), (3, None));
         let pose = &contents.topics["/pose"];
         assert_eq!((pose.messages, pose.rate(), pose.frame.as_deref()), (5, 2.0, Some("map")));
-        assert_eq!(contents.with_role(Role::Odometry), ["/pose"]);
+        assert_eq!(contents.with_role(Role::Odometry), [("/pose", pose)]);
         assert_eq!(contents.fault, None);
     }
 }

@@ -31,6 +31,7 @@ impl SequenceSource for Nothing {
             accelerometer: vec![],
             ground_truth: None,
             pose_factors: vec![],
+            corrected_jumps: vec![],
             unused: vec![],
         })
     }

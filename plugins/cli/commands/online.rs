@@ -205,12 +205,20 @@ impl StreamWatcher for Frames<'_> {
                         "after {frames}, relocalized in the prior map by {objects}: from now on, names and poses are those of that map"
                     ));
                 }
+                if let Some(jump) = &report.jump {
+                    let (frames, objects) =
+                        (count(report.frame + 1, "frame"), count(jump.matches.len(), "object"));
+                    output::print_note(&format!(
+                        "after {frames}, relocalized by {objects} after a jump of the odometry: the poses since then are corrected, and names may differ"
+                    ));
+                }
                 if let Some(noise) = &report.noise {
                     let frames = count(report.frame + 1, "frame");
                     output::print_note(&format!("after {frames}, noise estimated: {noise}"));
                 }
                 if self.frames.is_multiple_of(self.command.every)
                     || report.located.is_some()
+                    || report.jump.is_some()
                     || report.noise.is_some()
                 {
                     self.print_frame(report, mapper, took);

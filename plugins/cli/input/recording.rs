@@ -40,14 +40,14 @@ pub(crate) fn guess(contents: &Contents, file: &Path) -> GuessedSource {
     for (role, setting, instead) in ROLES {
         let topics = contents.with_role(role);
         // a recording often has several poses: the one with most messages has the highest rate
-        let Some(topic) = topics.iter().max_by_key(|name| contents.topics[**name].messages) else {
+        let Some((name, topic)) = topics.into_iter().max_by_key(|(_, topic)| topic.messages) else {
             guessed
                 .missing
                 .push(format!("no topic has messages of {}; {instead}", role.types().join(" or ")));
             continue;
         };
-        let _ = write!(guessed.source, ", {setting} = {topic:?}");
-        let frame = contents.topics[*topic].frame.as_deref().unwrap_or_default();
+        let _ = write!(guessed.source, ", {setting} = {name:?}");
+        let frame = topic.frame.as_deref().unwrap_or_default();
         guessed.is_level |= role == Role::Odometry && LEVEL_FRAMES.contains(&frame.trim_start_matches('/'));
     }
     if guessed.is_level {

@@ -117,6 +117,7 @@ pub(crate) mod tests {
             accelerometer: vec![],
             ground_truth: None,
             pose_factors: vec![],
+            corrected_jumps: vec![],
             unused: vec![],
         }
     }

@@ -17,6 +17,7 @@ use manifactor_quadric::{BoundingBox, BoundingBoxFactor, Camera, DualQuadric, Qu
 use manifactor_recording::fusion::FusedClass;
 use manifactor_recording::measurement::MeasurementSigmas;
 use manifactor_recording::prior_map::PriorObject;
+use manifactor_recording::sequence::jumps::{OdometryJump, find_jumps};
 use manifactor_recording::sequence::{Frame, ObjectId, Sequence, UnusedInput};
 use serde::Serialize;
 use std::sync::Arc;
@@ -239,6 +240,7 @@ impl Mapping {
         let doubts =
             plausible::trajectory_doubts(odometry).into_iter().map(|what| Warning::Implausible { what });
         self.warnings.extend(doubts);
+        self.warnings.extend(jump_warnings(sequence));
         self.warnings.extend(image_warning(sequence));
         let unused = sequence.unused.iter().chain(unused);
         self.warnings.extend(unused_warnings(unused, self.measurements.without_area));
@@ -425,6 +427,19 @@ pub fn motion_step<'a>(
     let noise = to.odometry_noise.as_deref().filter(|_| !is_estimated).unwrap_or(noise);
     let odometry = RelativePose { pose, noise, loss: loss.as_ref() };
     MotionStep { frames, seconds: to.timestamp - from.timestamp, odometry, estimates }
+}
+
+/// Returns warnings about jumps of the odometry: the corrected ones, and those that remain.
+fn jump_warnings(sequence: &Sequence) -> impl Iterator<Item = Warning> {
+    let corrected = sequence.corrected_jumps.clone();
+    let is_corrected =
+        |jump: &OdometryJump| corrected.iter().any(|corrected| corrected.timestamp == jump.timestamp);
+    let remaining = find_jumps(&sequence.frames).into_iter().filter(|jump| !is_corrected(jump)).collect();
+    [(corrected.clone(), true), (remaining, false)].into_iter().filter_map(
+        |(jumps, is_corrected): (Vec<_>, _)| {
+            Some(Warning::OdometryJump { first: *jumps.first()?, jumps: jumps.len(), is_corrected })
+        },
+    )
 }
 
 /// Returns the factors of a detection: the box factor, then the factors of its further measurements.

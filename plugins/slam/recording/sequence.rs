@@ -13,10 +13,12 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::sync::Arc;
 
+pub mod jumps;
 mod observations;
 pub mod pose_graph;
 
 pub use crate::keys::ObjectId;
+use jumps::OdometryJump;
 pub(crate) use observations::Observations;
 use pose_graph::{PoseFactor, PoseGraphChanges};
 
@@ -39,6 +41,8 @@ pub struct Sequence {
     pub ground_truth: Option<GroundTruth>,
     /// Factors on poses in addition to odometry, each with the index of the frame with which it arrived.
     pub pose_factors: Vec<(usize, PoseFactor)>,
+    /// Jumps of the odometry after which the poses were corrected.
+    pub corrected_jumps: Vec<OdometryJump>,
     /// Input that the source contains but does not use.
     pub unused: Vec<UnusedInput>,
 }
@@ -164,6 +168,7 @@ impl SequenceHeader {
             accelerometer: vec![],
             ground_truth,
             pose_factors: vec![],
+            corrected_jumps: vec![],
             unused: vec![],
         }
     }

@@ -18,6 +18,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 mod association;
+mod jump;
 mod location;
 mod noise;
 mod state;

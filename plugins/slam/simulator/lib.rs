@@ -152,6 +152,7 @@ impl SimulatedSource {
             accelerometer: readings.unwrap_or_default(),
             ground_truth: Some(truth),
             pose_factors: vec![],
+            corrected_jumps: vec![],
             unused: vec![],
         })
     }

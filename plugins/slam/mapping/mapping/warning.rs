@@ -1,5 +1,6 @@
 use manifactor_config::{nearest, quoted_list};
 use manifactor_recording::journal::LostFrames;
+use manifactor_recording::sequence::jumps::OdometryJump;
 use serde::{Serialize, Serializer};
 use std::fmt;
 use std::path::PathBuf;
@@ -21,6 +22,15 @@ pub enum Warning {
     Implausible {
         /// Description of the problem.
         what: String,
+    },
+    /// The odometry jumps, as after a loss of tracking.
+    OdometryJump {
+        /// The first jump.
+        first: OdometryJump,
+        /// Number of jumps.
+        jumps: usize,
+        /// True if the poses after them were corrected.
+        is_corrected: bool,
     },
     /// Detections of the source that are not used.
     Unused {
@@ -160,6 +170,21 @@ impl fmt::Display for Warning {
                     None if seen.is_empty() => Ok(()),
                     None => write!(f, "; there are {}", quoted_list(seen)),
                 }
+            }
+            Self::OdometryJump { first, jumps, is_corrected } => {
+                let OdometryJump { timestamp, seconds, translation, rotation } = first;
+                let often = if *jumps == 1 { String::new() } else { format!(", the first of {jumps} jumps") };
+                let degrees = rotation.to_degrees();
+                write!(
+                    f,
+                    "the odometry jumps by {translation:.2} m and {degrees:.0}° in {seconds:.3} s before {timestamp} s{often}: {}",
+                    if *is_corrected {
+                        "the poses after it are corrected by objects that were seen before"
+                    } else {
+                        "objects may be mapped twice; map the part before and the part after it one by one, the second with \
+                         the map of the first as `prior_map`"
+                    }
+                )
             }
             Self::Unused { what } => f.write_str(what),
             Self::TooManyUnused { what, allowed } => {

@@ -35,6 +35,10 @@ pub struct FrameReport {
     /// all frames. Earlier reports refer to a map that was discarded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub located: Option<Relocalization>,
+    /// The pose of the first frame after a jump of the odometry, in the map of the frames before it, if this frame
+    /// led to it. The poses after the jump are corrected, and all frames were processed again, as for `located`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jump: Option<Relocalization>,
     /// The estimated noise of all frames, from this one on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<StreamNoise>,
@@ -94,6 +98,7 @@ impl FrameReport {
             pose: Se3::identity(),
             body: None,
             located: None,
+            jump: None,
             noise: None,
             boxes: 0,
             box_objects: vec![],

@@ -5,9 +5,10 @@ use manifactor_graph::Noise;
 use manifactor_mapping::mapping::measurements::ObjectMeasurements;
 use manifactor_mapping::mapping::object_key;
 use manifactor_quadric::DualQuadric;
-use manifactor_recording::prior_map::PriorMap;
+use manifactor_recording::prior_map::{DetectionCounts, PriorMap, PriorObject};
 use manifactor_recording::sequence::ObjectId;
 use serde::Serialize;
+use std::sync::Arc;
 
 mod agreement;
 mod layout;
@@ -51,6 +52,25 @@ impl Mapper {
         let noise = aligned.noise(&first).ok()?;
         let Agreement { overlap, seen, .. } = agreement;
         Some(Relocalization { start, noise, lead: aligned.lead, overlap, seen, matches: aligned.matches })
+    }
+
+    /// Returns the mapped objects so far as a prior map. Objects whose covariance is not known are left out. Their
+    /// detection rates are unknown.
+    pub fn prior_map(&self) -> PriorMap {
+        let object = |(measured, quadric): (&ObjectMeasurements, DualQuadric)| {
+            let covariance = self.smoother.covariance(&[object_key(measured.id).as_str()]).ok()?;
+            let row = |r: usize| std::array::from_fn(|c| covariance[(r, c)]);
+            Some(Arc::new(PriorObject {
+                id: measured.id,
+                classes: measured.classes().clone(),
+                quadric,
+                covariance: std::array::from_fn(row),
+                detection_counts: DetectionCounts::default(),
+                least_px: measured.least_px(),
+                flat: quadric.is_flat(),
+            }))
+        };
+        PriorMap::new(self.up(), self.objects().filter_map(object).collect())
     }
 
     fn layout_object(&self, measured: &ObjectMeasurements, quadric: &DualQuadric) -> Option<LayoutObject> {

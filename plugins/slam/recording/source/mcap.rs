@@ -229,6 +229,7 @@ impl SequenceSource for Mcap {
             accelerometer: vec![],
             ground_truth,
             pose_factors: vec![],
+            corrected_jumps: vec![],
             unused,
         })
     }
@@ -280,9 +281,9 @@ impl Mcap {
         }
         match contents.with_role(role)[..] {
             [] => Err(McapError::NoTopic { file, types: types(), instead, topics: all() }),
-            [only] => Ok(only.to_owned()),
+            [(only, _)] => Ok(only.to_owned()),
             ref several => {
-                let several: Vec<String> = several.iter().map(|name| format!("`{name}`")).collect();
+                let several: Vec<String> = several.iter().map(|(name, _)| format!("`{name}`")).collect();
                 Err(McapError::SeveralTopics { file, types: types(), setting, topics: several.join(", ") })
             }
         }

@@ -110,6 +110,7 @@ impl SequenceSource for RecordedFiles {
             accelerometer: vec![],
             ground_truth: truth,
             pose_factors: vec![],
+            corrected_jumps: vec![],
             unused,
         })
     }

@@ -94,6 +94,7 @@ impl SequenceSource for TumRgbd {
             accelerometer: readings.into_iter().map(reading).collect(),
             ground_truth: truth,
             pose_factors: vec![],
+            corrected_jumps: vec![],
             unused,
         })
     }

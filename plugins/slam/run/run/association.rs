@@ -1,7 +1,7 @@
 //! Data association in a batch: frame by frame, then a second pass with all frames known.
 use super::RunError;
 use super::state::StreamState;
-use crate::output::report::{AssociationHistory, AssociationReport};
+use crate::output::report::AssociationReport;
 use manifactor_mapping::settings::RunSettings;
 use manifactor_recording::sequence::{Observation, Sequence};
 use manifactor_solve::Observer;
@@ -31,27 +31,24 @@ pub(super) fn associate_sequence(
         return Ok(AssociatedSequence { sequence, report: None });
     }
     let mut state = StreamState::new(sequence.header(), settings);
-    let (mut named, mut history) = (Sequence::clone(&sequence), AssociationHistory::default());
+    let mut named = Sequence::clone(&sequence);
     let mut taken = vec![];
     let (mut rejections, mut first_rejection) = (0, None);
     let mut interrupted = false;
     for observation in sequence.observations() {
         interrupted |= observer.poll().is_break();
         if interrupted {
-            history.record_frame(&observation.detections, None);
             taken.push(None);
             continue;
         }
         match state.add_frame(&observation) {
             Ok(report) => {
-                history.record_frame(&observation.detections, Some(&report));
                 report.refused.iter().for_each(|refused| tracing::warn!("{refused}"));
                 taken.push(Some(report.frame));
             }
             Err(error) => {
                 rejections += 1;
                 first_rejection.get_or_insert(error);
-                history.record_frame(&observation.detections, None);
                 taken.push(None);
             }
         }
@@ -65,9 +62,21 @@ pub(super) fn associate_sequence(
         }
         None => {}
     }
-    let mut mapper = state.mapper;
+    let StreamState { mut mapper, sequence: mapped, association, .. } = state;
+    // the poses after a jump of the odometry are corrected
+    let accepted = named.frames.iter_mut().zip(&taken).filter(|(_, frame)| frame.is_some());
+    for ((frame, _), mapped) in accepted.zip(&mapped.frames) {
+        frame.world_from_camera = mapped.world_from_camera;
+    }
+    named.corrected_jumps = mapped.corrected_jumps;
+    let mut history = association.with_skipped(
+        with_boxes(&sequence)
+            .zip(&taken)
+            .map(|((observation, _), frame)| (observation.detections, frame.is_some())),
+    );
     mapper.finish_association().refused.iter().for_each(|refused| tracing::warn!("{refused}"));
-    for ((observation, boxes), frame) in with_boxes(&sequence).zip(&taken) {
+    let corrected = Arc::new(named.clone());
+    for ((observation, boxes), frame) in with_boxes(&corrected).zip(&taken) {
         if let Some(frame) = *frame {
             history.replace_objects(boxes, mapper.id_changes(), |names| {
                 mapper.reassociate(frame, &observation, names)

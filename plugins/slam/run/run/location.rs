@@ -27,6 +27,11 @@ impl StartSearch {
         Self { map: settings.unknown_start().map(|prior| Arc::clone(&prior.map)), frames: 0 }
     }
 
+    /// Creates a search in a map.
+    pub(super) fn in_map(map: Arc<PriorMap>) -> Self {
+        Self { map: Some(map), frames: 0 }
+    }
+
     /// Searches for the pose after a frame. Returns it at most once.
     pub(super) fn search_after_frame(
         &mut self,

@@ -63,6 +63,9 @@ pub fn online(
             report.located = Some(located.clone());
             found = Some(FoundStart { frame: report.frame, located });
         }
+        if report.as_ref().is_ok_and(|report| report.jump.is_some()) {
+            progress.reset_map_counts();
+        }
         let seconds = began.elapsed().as_secs_f64();
         progress.add_frame(report.as_ref(), seconds);
         let goes_on = watch.on_frame(report.as_ref(), observation.as_ref().ok(), &mut taken.mapper, seconds);

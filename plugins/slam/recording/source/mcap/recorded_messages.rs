@@ -123,7 +123,8 @@ impl RecordedMessages {
     ) -> Result<String, McapError> {
         let candidates = contents.with_role(Role::CameraInfo).into_iter();
         let of_frame: Vec<&str> = candidates
-            .filter(|name| frame.is_some() && contents.topics[*name].frame.as_deref() == frame)
+            .filter(|(_, topic)| frame.is_some() && topic.frame.as_deref() == frame)
+            .map(|(name, _)| name)
             .collect();
         let only = of_frame.first().filter(|_| of_frame.len() == 1).map(|name| (*name).to_owned());
         let named = source.camera_info.clone().or(only);

@@ -68,6 +68,20 @@ impl AssociationHistory {
         self.forgotten.extend(taken.map_or(&[][..], |report| &report.forgotten));
     }
 
+    /// Returns the history of all frames: the boxes of skipped ones have no object. Each frame has its boxes, and
+    /// whether it was recorded.
+    pub(crate) fn with_skipped(self, frames: impl Iterator<Item = (Vec<Detection>, bool)>) -> Self {
+        let mut all = Self { boxes: vec![], forgotten: self.forgotten };
+        let mut recorded = self.boxes.into_iter();
+        for (detections, is_recorded) in frames {
+            match is_recorded {
+                true => all.boxes.extend(recorded.by_ref().take(detections.len())),
+                false => all.record_frame(&detections, None),
+            }
+        }
+        all
+    }
+
     /// Assigns new objects to some boxes, computed from their current objects.
     pub(crate) fn replace_objects(
         &mut self,
