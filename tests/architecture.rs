@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// From the bottom up: a plugin may depend on the plugins before it.
-const PLUGINS: [&str; 15] = [
+const PLUGINS: [&str; 16] = [
     "geometry",
     "quadric",
     "semantic",
     "formats",
+    "ros",
     "metrics",
     "recording",
     "simulator",

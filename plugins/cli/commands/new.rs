@@ -152,7 +152,7 @@ const TAKEN: [&str; 15] = [
 
 /// Crate names that would clash: crates of Rust, of the workspace and of a plugin's manifest, and the build
 /// script.
-const CRATES: [&str; 34] = [
+const CRATES: [&str; 35] = [
     "alloc",
     "build",
     "core",
@@ -179,6 +179,7 @@ const CRATES: [&str; 34] = [
     "manifactor_python",
     "manifactor_quadric",
     "manifactor_recording",
+    "manifactor_ros",
     "manifactor_run",
     "manifactor_semantic",
     "manifactor_simulator",

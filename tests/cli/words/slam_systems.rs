@@ -3,7 +3,7 @@ use super::block;
 use crate::{fed, folder, manifactor, path};
 use manifactor::geometry::{Se3, So3};
 use manifactor::nalgebra::Vector3;
-use manifactor_ros::testing::{
+use manifactor::slam::ros::testing::{
     CAMERA_INFO, DETECTIONS, ODOMETRY, TRANSFORMS, camera_message, detections_message, odometry_message,
     recording, transform_message,
 };
@@ -46,7 +46,9 @@ fn a_line_with_a_closure_is_a_frame() {
 
 /// Frames of the simulated desk, one JSON object each.
 fn frames() -> Vec<Value> {
-    let lines = manifactor("simulate examples/desk/desk.toml --lines").ended(0).stdout;
+    let lines = manifactor("simulate examples/desk/desk.toml --lines --set source.trajectory.frames=80")
+        .ended(0)
+        .stdout;
     lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 

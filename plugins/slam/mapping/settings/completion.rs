@@ -38,7 +38,7 @@ impl Default for CompletionSettings {
 impl RunSettings {
     /// Returns the settings of the second stage: all boxes with the model of visible parts, all objects, and
     /// a weak `shape_prior`.
-    pub(crate) fn of_completion(&self) -> Self {
+    pub fn of_completion(&self) -> Self {
         let CompletionSettings { border_px, initialiser, .. } = self.completion.clone();
         let (model, cut_sides) = (BoxModel::Truncated, CutSides::Keep);
         let detections = DetectionSettings { model, cut_sides, border_px, ..self.detections.clone() };

@@ -5,6 +5,7 @@ use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
 use manifactor_mapping::mapping::measurements::ObjectMeasurements;
 use manifactor_mapping::mapping::object_key;
+use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::{Camera, DualQuadric};
 use manifactor_recording::sequence::{ObjectId, Observation};
 use nalgebra::DMatrix;
@@ -18,6 +19,11 @@ impl Mapper {
     /// Returns the up direction in the map; `None` if unknown.
     pub fn up(&self) -> Option<Direction> {
         self.up.map_frame().and_then(|frame| frame.up)
+    }
+
+    /// Returns the settings with the current noise of the stream.
+    pub fn settings(&self) -> &RunSettings {
+        &self.settings
     }
 
     /// Returns the estimated pose of a frame; after it has left the window, the estimate at its time.

@@ -117,8 +117,8 @@ impl SequenceSource for RecordedFiles {
 
     fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
         let folder = folders.data_set(&self.folder, "source.folder")?;
-        let others = [Some(self.odometry.as_path()), self.ground_truth.as_deref(), self.objects.as_deref()];
-        let files: Vec<_> = self.detections.files().into_iter().map(Some).chain(others).collect();
+        let named = std::iter::once(self.odometry.as_path()).chain(self.detections.files()).map(Some);
+        let files: Vec<_> = named.chain([self.ground_truth.as_deref(), self.objects.as_deref()]).collect();
         check_files(&folder, &files)?;
         check_files(&folders.document, &[self.camera.file()])
     }

@@ -85,11 +85,7 @@ impl StreamState {
         let before = jumps.before.replace(observation.clone());
         let first = self.sequence.frames.len().checked_sub(2)?;
         if let Some(jump) = jump_at(&self.sequence.frames, first) {
-            let (header, jump) = (self.sequence.header(), (jump, first));
-            jumps.search = match jumps.search.take() {
-                Some(search) => search.restart(jump, &self.mapper, header, &self.settings),
-                None => JumpSearch::new(jump, &self.mapper, header, &self.settings),
-            };
+            jumps.search = JumpSearch::new((jump, first), &self.sequence, &self.mapper);
             jumps.search.as_mut()?.add_frame(&before?);
         }
         let found = jumps.search.as_mut()?.add_frame(observation);

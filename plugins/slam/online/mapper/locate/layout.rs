@@ -194,6 +194,13 @@ impl Layout {
     ) -> Option<(AlignedLayout, Agreement)> {
         let possible: Vec<AlignedLayout> =
             self.ranked_poses().into_iter().map(|ranked| self.aligned(ranked)).collect();
+        let best = possible.first().map(|aligned| (aligned.lead, aligned.matches.len()));
+        tracing::debug!(
+            local = self.local.len(),
+            known = self.known.len(),
+            ?best,
+            "looked for a place in a map"
+        );
         // missed objects only reduce a score, and the comparison with the detections is slow
         if possible.iter().all(|aligned| aligned.lead < MIN_LEAD_NATS) {
             return None;
