@@ -148,3 +148,42 @@ fn a_recording_of_ros_gives_the_map_of_its_frames() {
     let distance = (0..3).map(|i| (of_body[0][i + 1] - of_ros[0][i + 1]).powi(2)).sum::<f64>().sqrt();
     assert!((distance - base_from_camera.translation.norm()).abs() < 1e-6, "{distance}");
 }
+
+#[test]
+fn a_jump_of_the_odometry_is_corrected() {
+    let mut frames = frames();
+    let off =
+        Se3::new(So3::from_quaternion_xyzw([0.0, 0.0, 0.15, 0.9887]).unwrap(), Vector3::new(0.5, -0.3, 0.1));
+    for (i, frame) in frames.iter_mut().enumerate() {
+        for seen in frame["boxes"].as_array_mut().unwrap() {
+            seen.as_object_mut().unwrap().remove("object");
+        }
+        let pose: Se3 = serde_json::from_value(frame["pose"].clone()).unwrap();
+        if i >= 40 {
+            frame["pose"] = serde_json::to_value(off.compose(&pose)).unwrap();
+        }
+    }
+    let lines: String = frames.iter().map(|frame| format!("{frame}\n")).collect();
+    let document = format!(
+        "association = {{ type = \"likelihood\" }}\nsource = {{ type = \"json_lines\", file = \"f.jsonl\", up = [0, 0, 1], {CAMERA} }}\n"
+    );
+    let folder = folder(&[("jump.toml", &document), ("f.jsonl", &lines)]);
+    for command in ["run", "online"] {
+        let out = path(&folder, command);
+        let ran = manifactor(&format!("{command} {} --out {out}", path(&folder, "jump.toml"))).ended(0);
+        let report = std::fs::read_to_string(format!("{out}/report.json")).unwrap();
+        let report: Value = serde_json::from_str(&report).unwrap();
+        let variant = &report["variants"][0];
+        let warnings = variant["warnings"].to_string();
+        assert!(warnings.contains("corrected by objects that were seen before"), "{warnings}");
+        assert_eq!(
+            command == "online",
+            ran.stderr.contains("after a jump of the odometry"),
+            "{}",
+            ran.stderr
+        );
+        // the desk has 18 objects; uncorrected, most are mapped twice
+        let objects = variant["counts"]["objects"].as_u64().unwrap();
+        assert!((12..=20).contains(&objects), "{command}: {objects} objects");
+    }
+}
