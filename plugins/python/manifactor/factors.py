@@ -37,6 +37,7 @@ __all__ = [
     "landmark_se2",
     "landmark_se3",
     "max_mixture",
+    "on_body",
     "on_object",
     "parallel",
     "point_inside",
@@ -54,6 +55,9 @@ __all__ = [
     "prior_twist",
     "projection",
     "projection_bal",
+    "projection_double_sphere",
+    "projection_extended_unified",
+    "projection_kannala_brandt",
     "projection_radial_tangential",
     "range_se2_point2",
     "range_se2_se2",
@@ -757,6 +761,37 @@ def max_mixture(*, components: Sequence[types.Component]) -> Factor:
     return Factor("max_mixture", {"components": components})
 
 
+def on_body(
+    *,
+    factor: Factor,
+    body_from_camera: variables.Se3 | Fields,
+    poses: Numbers | None = None,
+) -> Factor:
+    """A factor on the pose of a body, if the variable is the pose of a camera mounted on it.
+
+    The factor gets world_from_body = world_from_camera · body_from_camera⁻¹. An example is a position from a
+    satellite receiver, or a loop closure between poses of a robot. Rows and noise are those of `factor`.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "x1"]
+    noise = { sigma = 0.1 }
+
+    [factors.factor]
+    type = "on_body"
+    body_from_camera = { translation = [0.2, 0.0, 0.5], rotation = [-0.5, 0.5, -0.5, 0.5] }
+    factor = { type = "between_se3", relative = { translation = [1.0, 0.0, 0.0], rotation = [0.0, 0.0, 0.0, 1.0] } }
+    ```
+
+    Args:
+        factor: Factor with one or more variables of type `se3`.
+        body_from_camera: Pose of the camera in the body frame.
+        poses: Variables that are poses of the camera, as indices into `keys` from 0. Default: all of type
+            `se3`.
+    """
+    return Factor("on_body", {"factor": factor, "body_from_camera": untagged(body_from_camera), "poses": poses})
+
+
 def on_object(*, up: Numbers | None = None) -> Factor:
     """The lowest point of an object is as high as the highest point of another: r = (c₁ - c₀) · up - e₁ - e₀, in
     metres.
@@ -1088,6 +1123,63 @@ def projection_bal(*, pixel: Numbers) -> Factor:
         pixel: Measured pixel, from the image centre, x right and y up.
     """
     return Factor("projection_bal", {"pixel": pixel})
+
+
+def projection_double_sphere(*, pixel: Numbers, camera: types.DoubleSphere) -> Factor:
+    """The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
+
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "l0"]
+    factor = { type = "projection_double_sphere", pixel = [310.0, 262.5], camera = { fx = 364.0, fy = 364.0, cx = 512.0, cy = 512.0, width = 1024, height = 1024, xi = -0.25, alpha = 0.5 } }
+    noise = { sigma = 1.0 }
+    ```
+
+    Args:
+        pixel: Measured pixel, x right and y down.
+        camera: The calibrated camera.
+    """
+    return Factor("projection_double_sphere", {"pixel": pixel, "camera": camera})
+
+
+def projection_extended_unified(*, pixel: Numbers, camera: types.ExtendedUnified) -> Factor:
+    """The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
+
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "l0"]
+    factor = { type = "projection_extended_unified", pixel = [310.0, 262.5], camera = { fx = 366.0, fy = 366.0, cx = 512.0, cy = 512.0, width = 1024, height = 1024, alpha = 0.5, beta = 1.0 } }
+    noise = { sigma = 1.0 }
+    ```
+
+    Args:
+        pixel: Measured pixel, x right and y down.
+        camera: The calibrated camera.
+    """
+    return Factor("projection_extended_unified", {"pixel": pixel, "camera": camera})
+
+
+def projection_kannala_brandt(*, pixel: Numbers, camera: types.KannalaBrandt) -> Factor:
+    """The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
+
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "l0"]
+    factor = { type = "projection_kannala_brandt", pixel = [310.0, 262.5], camera = { fx = 285.0, fy = 285.0, cx = 424.0, cy = 400.0, width = 848, height = 800, distortion = [0.01, 0.02, 0.0, 0.0] } }
+    noise = { sigma = 1.0 }
+    ```
+
+    Args:
+        pixel: Measured pixel, x right and y down.
+        camera: The calibrated camera.
+    """
+    return Factor("projection_kannala_brandt", {"pixel": pixel, "camera": camera})
 
 
 def projection_radial_tangential(*, pixel: Numbers, camera: types.RadialTangential) -> Factor:

@@ -42,8 +42,8 @@ class Component(TypedDict, total=False):
     noise: Noise
 
 
-class RadialTangential(TypedDict, total=False):
-    """A camera with radial and tangential lens distortion, with five coefficients."""
+class DoubleSphere(TypedDict, total=False):
+    """A fisheye camera with two parameters."""
 
     #: Focal length along x, in pixels.
     fx: Required[float]
@@ -57,7 +57,68 @@ class RadialTangential(TypedDict, total=False):
     width: Required[int]
     #: Size of the image, in pixels.
     height: Required[int]
-    #: Coefficients k₁, k₂, p₁, p₂, k₃, in OpenCV's order.
+    #: Distance ξ of the spheres' centres, above -1 and up to 1.
+    xi: Required[float]
+    #: Place α of the pinhole, from 0 to 1.
+    alpha: Required[float]
+
+
+class ExtendedUnified(TypedDict, total=False):
+    """A fisheye camera with two parameters."""
+
+    #: Focal length along x, in pixels.
+    fx: Required[float]
+    #: Focal length along y, in pixels.
+    fy: Required[float]
+    #: Principal point, in pixels.
+    cx: Required[float]
+    #: Principal point, in pixels.
+    cy: Required[float]
+    #: Size of the image, in pixels.
+    width: Required[int]
+    #: Size of the image, in pixels.
+    height: Required[int]
+    #: Share α of the distance in the depth, from 0 to 1.
+    alpha: Required[float]
+    #: Weight β of the distance from the optical axis.
+    beta: Required[float]
+
+
+class KannalaBrandt(TypedDict, total=False):
+    """A fisheye camera with four coefficients."""
+
+    #: Focal length along x, in pixels.
+    fx: Required[float]
+    #: Focal length along y, in pixels.
+    fy: Required[float]
+    #: Principal point, in pixels.
+    cx: Required[float]
+    #: Principal point, in pixels.
+    cy: Required[float]
+    #: Size of the image, in pixels.
+    width: Required[int]
+    #: Size of the image, in pixels.
+    height: Required[int]
+    #: Coefficients k₁, k₂, k₃, k₄.
+    distortion: Required[Numbers]
+
+
+class RadialTangential(TypedDict, total=False):
+    """A camera with radial and tangential lens distortion, with four, five or eight coefficients."""
+
+    #: Focal length along x, in pixels.
+    fx: Required[float]
+    #: Focal length along y, in pixels.
+    fy: Required[float]
+    #: Principal point, in pixels.
+    cx: Required[float]
+    #: Principal point, in pixels.
+    cy: Required[float]
+    #: Size of the image, in pixels.
+    width: Required[int]
+    #: Size of the image, in pixels.
+    height: Required[int]
+    #: Coefficients k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆ in OpenCV's order: the first four, five or all.
     distortion: Required[Numbers]
 
 
