@@ -115,9 +115,9 @@ pub struct TransformList {
 /// A pose with its time and frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FramedPose {
-    /// Time, and name of the frame in which the pose is given.
+    /// Time, and name of the outer frame.
     pub header: Header,
-    /// Name of the frame that has this pose, if the message says it.
+    /// Name of the frame with this pose, if the message has it.
     pub child: Option<String>,
     /// header_from_child.
     pub pose: Pose,

@@ -27,7 +27,7 @@ use pose_graph::{PoseFactor, PoseGraphChanges};
 pub struct Sequence {
     /// Camera, shared by all frames.
     pub camera: Camera,
-    /// Pose of the camera on the body whose odometry the source has. `None`: the odometry is that of the camera.
+    /// Pose of the camera on the body whose odometry the source has. `None`: it is the odometry of the camera.
     pub body_from_camera: Option<Se3>,
     /// Frames in strictly increasing order of time.
     pub frames: Vec<Frame>,
@@ -127,7 +127,7 @@ impl fmt::Display for DetectionsWithoutPose {
 pub struct SequenceHeader {
     /// Camera, shared by all frames.
     pub camera: Camera,
-    /// Pose of the camera on the body whose odometry the source has. `None`: the odometry is that of the camera.
+    /// Pose of the camera on the body whose odometry the source has. `None`: it is the odometry of the camera.
     pub body_from_camera: Option<Se3>,
     /// Up direction in the odometry frame, if the source knows it.
     pub up: Option<Direction>,

@@ -17,7 +17,7 @@ pub struct OdometryJump {
     pub rotation: f64,
 }
 
-/// Largest acceleration of a camera: five times that of a fall. Unit: m/s².
+/// Largest acceleration of a camera, five times gravity. Unit: m/s².
 const MAX_ACCELERATION: f64 = 50.0;
 /// Largest angular acceleration of a camera. Unit: rad/s².
 const MAX_ANGULAR_ACCELERATION: f64 = 100.0;
@@ -37,7 +37,7 @@ pub fn find_jumps(frames: &[Frame]) -> Vec<OdometryJump> {
 }
 
 /// Returns the jump between a frame and the one before. It needs two frames before and one after: a step is a jump if
-/// its speed differs from those of both neighbours by more than a camera can accelerate. `None` if there is no jump.
+/// its speed differs from the speeds of both neighbours by more than a camera can accelerate. `None` if there is no jump.
 pub fn jump_at(frames: &[Frame], frame: usize) -> Option<OdometryJump> {
     let [translation, rotation] = excess(frames, frame)?;
     let (_, _, seconds) = step(frames, frame)?;

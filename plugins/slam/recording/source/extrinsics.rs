@@ -56,7 +56,7 @@ impl Extrinsics {
         });
     }
 
-    /// Returns the noise of a step of the camera from that of the body: with the step S and the extrinsics E,
+    /// Converts the noise of a step of the body to the camera: with the step S and the extrinsics E,
     /// E⁻¹ S exp(δ) E = E⁻¹ S E exp(Ad(E⁻¹) δ).
     fn noise(&self, noise: &Noise) -> Result<Noise, String> {
         if noise.observed().is_some_and(|rows| rows.contains(&false)) {

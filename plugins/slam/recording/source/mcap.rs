@@ -56,7 +56,7 @@ pub struct Mcap {
     /// Set if the boxes were found in the rectified image.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub rectified: bool,
-    /// Frame in which transforms give the odometry, if `odometry` is a topic of transforms.
+    /// Outer frame of the odometry, if `odometry` is a topic of transforms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry_frame: Option<String>,
     /// Frame that has the poses of the odometry. Default: `child_frame_id` of the messages.
