@@ -76,7 +76,7 @@ fn is_turned(step: &Se3) -> bool {
 }
 
 /// Returns the median; 0 for an empty list.
-fn median(mut list: Vec<f64>) -> f64 {
+pub fn median(mut list: Vec<f64>) -> f64 {
     list.sort_unstable_by(f64::total_cmp);
     list.get(list.len() / 2).copied().unwrap_or_default()
 }

@@ -1,5 +1,6 @@
 //! Jumps of the odometry, as after a loss of tracking.
 use super::Frame;
+use manifactor_formats::plausible::median;
 use manifactor_geometry::Se3;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -71,11 +72,6 @@ fn excess(frames: &[Frame], frame: usize) -> Option<[f64; 2]> {
     };
     let [before, after] = [beyond(step(frames, frame - 1)?), beyond(step(frames, frame + 1)?)];
     Some([before[0].min(after[0]), before[1].min(after[1])])
-}
-
-fn median(mut list: Vec<f64>) -> f64 {
-    list.sort_unstable_by(f64::total_cmp);
-    list.get(list.len() / 2).copied().unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -267,20 +267,28 @@ impl Mcap {
         };
         let types = || role.types().join(" or ");
         let file = file.to_owned();
+        let allows_transforms = role == Role::Odometry;
+        // poses of messages are not mixed with transforms
+        let is_of_transforms = allows_transforms && self.odometry_frame.is_some();
+        let messages = "has poses itself, and `source.odometry_frame` is for a topic of transforms";
         if let Some(named) = named {
-            let allows_transforms = role == Role::Odometry;
             let fault = match contents.topics.get(named) {
                 None => "is not in the recording".to_owned(),
-                Some(topic) if topic.role == Some(role) => return Ok(named.clone()),
+                Some(topic) if topic.role == Some(role) && !is_of_transforms => return Ok(named.clone()),
                 Some(topic) if topic.role == Some(Role::Transforms) && allows_transforms => {
                     return Ok(named.clone());
                 }
+                Some(topic) if topic.role == Some(role) => messages.to_owned(),
                 Some(topic) => format!("has messages of {}, not of {}", topic.message_type, types()),
             };
             return Err(McapError::WrongTopic { file, setting, topic: named.clone(), fault, topics: all() });
         }
         match contents.with_role(role)[..] {
             [] => Err(McapError::NoTopic { file, types: types(), instead, topics: all() }),
+            [(only, _)] if is_of_transforms => {
+                let (topic, fault) = (only.to_owned(), messages.to_owned());
+                Err(McapError::WrongTopic { file, setting, topic, fault, topics: all() })
+            }
             [(only, _)] => Ok(only.to_owned()),
             ref several => {
                 let several: Vec<String> = several.iter().map(|(name, _)| format!("`{name}`")).collect();

@@ -166,6 +166,11 @@ mod recordings {
                 "`source.odometry` names `/odo`, which is not in the recording",
             ),
             (json!({"detections": "/odom"}), messages(), "not of vision_msgs/msg/Detection2DArray"),
+            (
+                json!({"odometry": "/odom", "odometry_frame": "odom", "body_frame": "base_link"}),
+                messages(),
+                "`source.odometry_frame` is for a topic of transforms",
+            ),
             (json!({"camera_frame": "cam"}), messages(), "no transform has the frame `cam`; there are"),
             (
                 json!({"odometry": "/tf"}),
