@@ -76,8 +76,11 @@ fn steps_take_no_more_than_the_second() {
             steps.push(held(&region));
             ControlFlow::Continue(())
         };
-        let stop =
-            Stopping { relative_cost: NotNegative::literal(0.0), max_iterations: 8, ..Stopping::default() };
+        let stop = Stopping {
+            relative_cost: Some(NotNegative::literal(0.0)),
+            max_iterations: 8,
+            ..Stopping::default()
+        };
         let solver = LevenbergMarquardt { stop, ..LevenbergMarquardt::default() };
         let outcome = solve(&graph, &values, &solver, &mut watch).unwrap().outcome;
         assert!(outcome.final_cost < 0.5 * outcome.initial_cost, "{outcome:?}");

@@ -17,7 +17,7 @@ const LEFT: f64 = 1e-3;
 fn left(smoother: &mut Smoother, iterations: usize) -> f64 {
     let stop = Stopping {
         max_iterations: iterations,
-        relative_cost: if iterations == 1 { NotNegative::literal(1.0) } else { NotNegative::literal(0.0) },
+        relative_cost: Some(NotNegative::literal(if iterations == 1 { 1.0 } else { 0.0 })),
         absolute_cost: NotNegative::literal(0.0),
         gradient: NotNegative::literal(0.0),
         step: NotNegative::literal(0.0),

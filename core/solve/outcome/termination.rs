@@ -63,6 +63,9 @@ pub enum Stall {
     Domain,
     /// Several Gauss-Newton steps in a row raised the cost.
     Diverging,
+    /// The steps have led to where the cost does not depend on an unknown, although it did at the initial
+    /// values.
+    RunOff,
 }
 
 /// A direction along which the cost is constant.
@@ -114,6 +117,9 @@ impl fmt::Display for Termination {
                 Stall::Jump => "stalled: the cost has a jump or a kink here, and is least beside it",
                 Stall::TrustRegion => "stalled: no step lowers the cost, however small the trust region",
                 Stall::Domain => "stalled: each step leaves the domain of a factor",
+                Stall::RunOff => {
+                    "stalled: the steps ran off to where the cost does not depend on a variable; use different initial values, or add a prior"
+                }
                 Stall::Diverging => "stalled: the steps raise the cost; use levenberg_marquardt",
             }),
             Self::Indeterminate(u) => write!(f, "indeterminate: {u}"),

@@ -92,6 +92,10 @@ pub struct Descent<'a> {
     /// Evaluation of the last trial step.
     pub(crate) trial: Evaluation,
     pub(crate) iterations: usize,
+    /// Relative change of the cost that ends the solve.
+    pub(crate) relative_cost: f64,
+    /// Diagonal of H at the initial estimate.
+    initial_diagonal: Vec<f64>,
     observer: &'a mut dyn Observer,
     initial_cost: f64,
     clock: Instant,
@@ -121,6 +125,8 @@ impl<'a> Descent<'a> {
         problem.times = Times { compile, ..Times::default() };
         let at = problem.linearize();
         let mut descent = Self {
+            relative_cost: stop.relative_cost(problem.dim()),
+            initial_diagonal: problem.system.diagonal().copied().collect(),
             problem,
             stop,
             at,
@@ -267,6 +273,16 @@ impl<'a> Descent<'a> {
         self.largest_cosine().powi(2) > SHARE
     }
 
+    /// Returns whether the slope of the cost along an unknown has vanished on the way, although it has
+    /// factors. An example is the rate of an exponential function that has become so large that its values
+    /// are zero. The gradient is zero there, but it is no minimum.
+    pub(crate) fn has_run_off(&self) -> bool {
+        /// Remaining share of the diagonal entry of H below which a residual does not depend on the unknown.
+        const MIN_SHARE: f64 = 1e-20;
+        let mut entries = self.problem.system.diagonal().zip(&self.initial_diagonal);
+        entries.any(|(now, initial)| *now < MIN_SHARE * initial)
+    }
+
     fn largest_gradient(&self) -> f64 {
         // not `f64::max`, which would drop NaN
         self.problem.system.g.iter().fold(0.0, |m, g| if m.is_nan() || g.abs() <= m { m } else { g.abs() })
@@ -294,7 +310,7 @@ impl<'a> Descent<'a> {
 
     /// Returns whether a change of the cost is within the relative tolerance.
     pub(crate) fn is_small(&self, change: f64) -> bool {
-        change.abs() <= *self.stop.relative_cost * self.at.cost.abs()
+        change.abs() <= self.relative_cost * self.at.cost.abs()
     }
 
     /// Returns the reason for the lack of an acceptable step, from the last trial step, which is almost
@@ -341,7 +357,7 @@ impl<'a> Descent<'a> {
         if self.at.inactive != inactive {
             return None;
         }
-        let reason = if (before - after).abs() <= *self.stop.relative_cost * before.abs() {
+        let reason = if (before - after).abs() <= self.relative_cost * before.abs() {
             Tolerance::RelativeCost
         } else if step.norm <= *self.stop.step {
             Tolerance::Step

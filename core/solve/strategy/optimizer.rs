@@ -48,8 +48,10 @@ manifactor_graph::kind!(dyn Optimizer, "solver");
 pub struct Stopping {
     /// Maximum number of linearizations.
     pub max_iterations: usize,
-    /// Stop once a step changes the cost by less than this share of it.
-    pub relative_cost: NotNegative,
+    /// Stop once a step changes the cost by less than this share of it. Default: 1e-8. With at most 32
+    /// unknowns, where further steps cost little: 1e-15, which is rounding error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_cost: Option<NotNegative>,
     /// Stop once the cost is below this.
     pub absolute_cost: NotNegative,
     /// Stop once no entry of the gradient is larger than this.
@@ -62,10 +64,24 @@ impl Default for Stopping {
     fn default() -> Self {
         Self {
             max_iterations: 100,
-            relative_cost: NotNegative::literal(1e-8),
+            relative_cost: None,
             absolute_cost: NotNegative::literal(1e-20),
             gradient: NotNegative::literal(1e-12),
             step: NotNegative::literal(1e-12),
+        }
+    }
+}
+
+/// Maximum number of unknowns for which a solve continues down to rounding error.
+const MAX_SMALL: usize = 32;
+
+impl Stopping {
+    /// Returns the relative change of the cost that ends a solve with this number of unknowns.
+    pub(crate) fn relative_cost(&self, unknowns: usize) -> f64 {
+        match self.relative_cost {
+            Some(share) => *share,
+            None if unknowns <= MAX_SMALL => 1e-15,
+            None => 1e-8,
         }
     }
 }

@@ -7,6 +7,7 @@
     clippy::print_stdout,
     clippy::print_stderr
 )]
+mod fits;
 mod laws;
 mod long;
 mod messages;

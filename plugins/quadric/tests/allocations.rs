@@ -31,7 +31,7 @@ fn allocations((graph, values): &(Graph, Values), solver: &dyn Optimizer) -> Vec
 // A single test, because a parallel test on another thread would be counted too.
 #[test]
 fn no_iteration_after_the_first_allocates() {
-    let stop = Stopping { relative_cost: NotNegative::literal(1e-14), ..Stopping::default() };
+    let stop = Stopping { relative_cost: Some(NotNegative::literal(1e-14)), ..Stopping::default() };
     let solvers: [Box<dyn Optimizer>; 2] = [
         Box::new(GaussNewton { stop: stop.clone(), ..GaussNewton::default() }),
         Box::new(LevenbergMarquardt { stop, ..LevenbergMarquardt::default() }),

@@ -52,6 +52,11 @@ impl Descent<'_> {
                 Some(unconstrained),
                 Termination::Converged { .. } | Termination::Stalled { reason: Stall::Jump },
             ) => Termination::Indeterminate(unconstrained.clone()),
+            (
+                None,
+                Termination::Converged { .. }
+                | Termination::Stalled { reason: Stall::Damping | Stall::TrustRegion },
+            ) if self.has_run_off() => Termination::Stalled { reason: Stall::RunOff },
             (_, termination) => termination,
         };
         Outcome {

@@ -45,8 +45,11 @@ impl<'a> Graduation<'a> {
         graph: Option<&'a Graph>,
         observer: &'a mut dyn Observer,
     ) -> Self {
-        let stop =
-            Stopping { relative_cost: NotNegative::literal(1e-3), max_iterations: 10, ..Stopping::default() };
+        let stop = Stopping {
+            relative_cost: Some(NotNegative::literal(1e-3)),
+            max_iterations: 10,
+            ..Stopping::default()
+        };
         let inner =
             LevenbergMarquardt { initial_lambda: Positive::literal(1e-10), stop, ..Default::default() };
         let (bounds, weights) = (gnc.bounds(problem), vec![1.0; problem.factors()]);

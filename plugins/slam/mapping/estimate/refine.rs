@@ -142,7 +142,7 @@ fn solver() -> LevenbergMarquardt {
 
 /// Returns a solver that stops when a step lowers the cost by less than this share.
 pub(super) fn coarse_solver(max_iterations: usize, relative_cost: NotNegative) -> LevenbergMarquardt {
-    let stop = Stopping { max_iterations, relative_cost, ..Stopping::default() };
+    let stop = Stopping { max_iterations, relative_cost: Some(relative_cost), ..Stopping::default() };
     // equal damping for all directions: damping in proportion to the Hessian would let a semi-axis vanish,
     // because the derivatives of a very short one are almost zero
     LevenbergMarquardt {
