@@ -221,8 +221,11 @@ where
     if anchored.iter().all(|anchored| *anchored) {
         return Ok(net.poses.clone());
     }
-    let stop =
-        |relative_cost, max_iterations| Stopping { relative_cost, max_iterations, ..Stopping::default() };
+    let stop = |share, max_iterations| Stopping {
+        relative_cost: Some(share),
+        max_iterations,
+        ..Stopping::default()
+    };
     let near =
         LevenbergMarquardt { stop: stop(NotNegative::literal(1e-9), 100), ..LevenbergMarquardt::default() };
     let near = solve(&graph, &values, &near, &mut Silent)?.values;

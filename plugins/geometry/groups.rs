@@ -9,7 +9,7 @@ mod se3;
 mod small_angle;
 mod so2;
 mod so3;
-mod twist;
+mod vectors;
 
 pub use coordinates::{Coordinates, CoordinatesError};
 pub use lie_group::LieGroup;
@@ -19,7 +19,7 @@ pub use se2::Se2;
 pub use se3::Se3;
 pub use so2::{AngleError, So2, atan2, wrap};
 pub use so3::{RotationError, So3};
-pub use twist::Twist;
+pub use vectors::{ImuBias, Twist, Velocity};
 
 pub(crate) use se2::quarter_turn;
 pub(crate) use so2::Angle;

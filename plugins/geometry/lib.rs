@@ -30,8 +30,8 @@ pub use factors::{
     OnBodyError, Position, Prior, Range,
 };
 pub use groups::{
-    AngleError, Coordinates, CoordinatesError, LieGroup, MatrixError, Point1, Point2, Point3, Rn,
-    RotationError, Se2, Se3, So2, So3, Twist, atan2, wrap,
+    AngleError, Coordinates, CoordinatesError, ImuBias, LieGroup, MatrixError, Point1, Point2, Point3, Rn,
+    RotationError, Se2, Se3, So2, So3, Twist, Velocity, atan2, wrap,
 };
 pub use initialise::{Chordal, SpanningTree, Tree, spanning_tree};
 pub use procrustes::{NearestRotation, PointPairs, Similarity, nearest_rotation};

@@ -1,5 +1,5 @@
 //! Strategies for rotations, poses and points, including the cases that tend to break formulas.
-use crate::{BalCamera, CameraModel, Point2, Point3, Rn, Se2, Se3, So2, So3, Twist};
+use crate::{BalCamera, CameraModel, ImuBias, Point2, Point3, Rn, Se2, Se3, So2, So3, Twist, Velocity};
 use manifactor_testing::register_points;
 use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
 use nalgebra::{Vector1, Vector2, Vector3, Vector6};
@@ -18,6 +18,8 @@ register_points!(Rn<1>, any_point::<1>(), [Rn::<1>(Vector1::zeros())]);
 register_points!(Point2, any_point2(), [Rn::<2>(Vector2::zeros())]);
 register_points!(Point3, any_point3(), [Rn::<3>(Vector3::zeros())]);
 register_points!(Twist, any_twist(), [Twist::zero()]);
+register_points!(Velocity, any_velocity(), [Velocity::zero()]);
+register_points!(ImuBias, any_imu_bias(), [ImuBias::zero()]);
 register_points!(BalCamera, any_bal_camera(), []);
 
 /// Rotation by π about an axis that is not a coordinate axis.
@@ -33,6 +35,14 @@ pub fn any_point<const N: usize>() -> impl Strategy<Value = Rn<N>> + Clone {
 /// Velocities of a body, up to 10 rad/s and 10 m/s.
 pub fn any_twist() -> impl Strategy<Value = Twist> + Clone {
     vector(SIZE).prop_map(Twist)
+}
+/// Returns a strategy for velocities up to [`SIZE`].
+pub fn any_velocity() -> impl Strategy<Value = Velocity> + Clone {
+    vector(SIZE).prop_map(Velocity)
+}
+/// Returns a strategy for biases of up to 1 rad/s and m/s².
+pub fn any_imu_bias() -> impl Strategy<Value = ImuBias> + Clone {
+    vector(1.0).prop_map(ImuBias)
 }
 
 /// Points in the plane.

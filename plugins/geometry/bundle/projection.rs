@@ -4,6 +4,8 @@ use crate::{Camera, CameraModel, Coordinates, Point3, Se3};
 use manifactor_graph::prelude::*;
 
 /// A camera measures a point at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
+///
+/// With `body_from_camera`, the variable is the pose of a body on which the camera is mounted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, bound = "M: CameraModel")]
 #[schemars(bound = "M: CameraModel + ProjectionName", description = description::<M>())]
@@ -12,17 +14,37 @@ pub struct Projection<M = Camera> {
     pub pixel: Coordinates<2>,
     /// The calibrated camera.
     pub camera: M,
+    /// Pose of the camera in the frame of the variable. Default: the variable is the pose of the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_from_camera: Option<Se3>,
 }
 
 fn description<M: CameraModel + ProjectionName>() -> String {
     format!(
         "The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.\n\nVariables: the pose of the camera, from its own frame (z \
-         forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if \
+         forward) to the world's, and the point. With `body_from_camera`, the pose is that of a body on which the camera is mounted. π is the projection of `camera`. Rows: x to the right and y down. Not defined if \
          the camera cannot see the point, for example behind it; the factor is inactive there.\n\n```toml\n[[factors]]\nkeys = \
          [\"x0\", \"l0\"]\nfactor = {{ type = \"{}\", pixel = [310.0, 262.5], camera = {} }}\nnoise = {{ sigma = 1.0 }}\n```",
         M::PROJECTION,
         M::EXAMPLE
     )
+}
+
+impl<M: CameraModel> Projection<M> {
+    /// Creates the measurement of a camera whose pose is the variable.
+    pub fn new(pixel: Coordinates<2>, camera: M) -> Self {
+        Self { pixel, camera, body_from_camera: None }
+    }
+
+    /// Returns the point in the frame of the camera.
+    #[inline]
+    fn seen<T: Scalar>(&self, pose: &Se3<T>, point: &Vector3<T>) -> Vector3<T> {
+        let point = pose.inverse_act(point);
+        match &self.body_from_camera {
+            Some(mounting) => mounting.lift::<T>().inverse_act(&point),
+            None => point,
+        }
+    }
 }
 
 impl<M: CameraModel> Residual for Projection<M> {
@@ -32,12 +54,12 @@ impl<M: CameraModel> Residual for Projection<M> {
 
     #[inline]
     fn residual<T: Scalar>(&self, (pose, point): Lifted<Self::Variables, T>) -> Vector2<T> {
-        self.camera.project(&pose.inverse_act(&point)) - self.pixel.lift::<T>()
+        self.camera.project(&self.seen(&pose, &point)) - self.pixel.lift::<T>()
     }
 
     #[inline]
     fn is_defined(&self, (pose, point): Refs<'_, Self::Variables>) -> bool {
-        self.camera.sees(&pose.inverse_act(point))
+        self.camera.sees(&self.seen(pose, point))
     }
 
     #[inline]
@@ -47,12 +69,16 @@ impl<M: CameraModel> Residual for Projection<M> {
         _free: &[bool],
         jacobians: &mut Jacobians<Self>,
     ) -> Vector2<f64> {
-        let seen = pose.inverse_act(point);
-        let by_seen = self.camera.derivative(&seen);
+        let local = pose.inverse_act(point);
+        let seen = self.seen(pose, point);
+        let mut by_local = self.camera.derivative(&seen);
+        if let Some(mounting) = &self.body_from_camera {
+            by_local *= mounting.rotation.matrix().transpose();
+        }
         // P = Exp(-δ)∘P: ∂P/∂(ω, v) = [P]×, -I
-        jacobians.0.fixed_columns_mut::<3>(0).copy_from(&(by_seen * seen.cross_matrix()));
-        jacobians.0.fixed_columns_mut::<3>(3).copy_from(&-by_seen);
-        jacobians.1 = by_seen * pose.rotation.matrix().transpose();
+        jacobians.0.fixed_columns_mut::<3>(0).copy_from(&(by_local * local.cross_matrix()));
+        jacobians.0.fixed_columns_mut::<3>(3).copy_from(&-by_local);
+        jacobians.1 = by_local * pose.rotation.matrix().transpose();
         self.camera.project(&seen) - *self.pixel
     }
 }
@@ -70,14 +96,34 @@ mod tests {
         Camera { skew: 3.0, ..Camera::new([500.0, 510.0, 320.0, 240.0], 640, 480).unwrap() }
     }
     fn at(pixel: Vector2<f64>) -> Projection {
-        Projection { pixel: Coordinates::new(pixel).unwrap(), camera: camera() }
+        Projection::new(Coordinates::new(pixel).unwrap(), camera())
     }
     fn any_projection() -> impl Strategy<Value = (Projection, Se3, Point3)> {
         (vector(500.0), any_se3(), in_front())
             .prop_map(|(pixel, pose, p)| (at(pixel), pose, Point3::new(pose.act(&p))))
     }
 
-    jacobian_laws! { jacobians_agree: any_projection() }
+    fn any_mounted() -> impl Strategy<Value = (Projection, Se3, Point3)> {
+        (any_projection(), any_se3()).prop_map(|((factor, pose, point), mounting)| {
+            let body = pose.compose(&mounting.inverse());
+            (Projection { body_from_camera: Some(mounting), ..factor }, body, point)
+        })
+    }
+
+    jacobian_laws! {
+        jacobians_agree: any_projection();
+        jacobians_of_a_mounted_camera_agree: any_mounted();
+    }
+
+    proptest! {
+        #[test]
+        fn a_mounted_camera_sees_what_a_camera_there_sees((factor, body, point) in any_mounted()) {
+            let camera = body.compose(&factor.body_from_camera.unwrap());
+            let r = factor.residual::<f64>((body, point.0));
+            let there = Projection { body_from_camera: None, ..factor }.residual::<f64>((camera, point.0));
+            prop_assert!((r - there).norm() < 1e-6);
+        }
+    }
 
     #[test]
     fn moving_pose_and_point_together_changes_nothing() {

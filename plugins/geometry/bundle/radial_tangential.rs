@@ -238,7 +238,7 @@ mod tests {
 
     jacobian_laws! {
         jacobians_agree: (any_visible_point(), vector::<2>(500.0), any_se3()).prop_map(|(point, pixel, pose)| {
-            let factor = Projection { pixel: Coordinates::new(pixel).unwrap(), camera: freiburg1() };
+            let factor = Projection::new(Coordinates::new(pixel).unwrap(), freiburg1());
             (factor, pose, Point3::new(pose.act(&point)))
         })
     }

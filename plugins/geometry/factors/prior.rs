@@ -2,7 +2,7 @@
 //!
 //! The logarithm jumps if X differs from Z by a rotation of π.
 use crate::groups::LieGroup;
-use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3, Twist};
+use crate::{ImuBias, Point1, Point2, Point3, Se2, Se3, So2, So3, Twist, Velocity};
 use manifactor_graph::prelude::*;
 
 /// A prior: the variable is close to `value`.
@@ -55,12 +55,15 @@ register_factor!("prior_point1", Prior<Point1>);
 register_factor!("prior_point2", Prior<Point2>);
 register_factor!("prior_point3", Prior<Point3>);
 register_factor!("prior_twist", Prior<Twist>);
+register_factor!("prior_velocity", Prior<Velocity>);
+register_factor!("prior_imu_bias", Prior<ImuBias>);
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::{
-        any_point, any_se2, any_se3, any_so2, any_so3, any_twist, se2_tangent, se3_tangent,
+        any_imu_bias, any_point, any_se2, any_se3, any_so2, any_so3, any_twist, any_velocity, se2_tangent,
+        se3_tangent,
     };
     use manifactor_graph::Manifold;
     use manifactor_testing::{jacobian_laws, strategies::rotation_vector};
@@ -77,6 +80,8 @@ mod tests {
         jacobians_agree_on_point2: (any_point::<2>(), any_point::<2>()).prop_map(|(value, x)| (Prior { value }, x));
         jacobians_agree_on_point3: (any_point::<3>(), any_point::<3>()).prop_map(|(value, x)| (Prior { value }, x));
         jacobians_agree_on_twist: (any_twist(), any_twist()).prop_map(|(value, x)| (Prior { value }, x));
+        jacobians_agree_on_velocity: (any_velocity(), any_velocity()).prop_map(|(value, x)| (Prior { value }, x));
+        jacobians_agree_on_imu_bias: (any_imu_bias(), any_imu_bias()).prop_map(|(value, x)| (Prior { value }, x));
     }
 
     proptest! {

@@ -40,6 +40,15 @@ pub(crate) fn exponential<T: Scalar>(theta2: T) -> Exponential<T> {
     Exponential { cos_half, sin_half, a: sin_half * sin_half * 2.0, b }
 }
 
+/// Returns (1/2 - (1 - cos θ) / θ²) / θ², with `a` from [`exponential`].
+pub(crate) fn second_integral<T: Scalar>(theta2: T, a: T) -> T {
+    if theta2 < T::from(SERIES_LIMIT) {
+        series(theta2, [1.0 / 24.0, -1.0 / 720.0, 1.0 / 40320.0, -1.0 / 3628800.0, 1.0 / 479001600.0])
+    } else {
+        (T::from(0.5) - a) / theta2
+    }
+}
+
 /// Returns k = (1 - (θ/2) cot(θ/2)) / θ² for the logarithmic maps. `half_cot` computes (θ/2) cot(θ/2) and is
 /// called only away from zero.
 pub(crate) fn k<T: Scalar>(theta2: T, half_cot: impl FnOnce() -> T) -> T {
@@ -74,6 +83,8 @@ mod tests {
         for (x, y) in [(x.cos_half, y.cos_half), (x.sin_half, y.sin_half), (x.a, y.a), (x.b, y.b)] {
             assert!((x - y).abs() < 1e-13, "{x} {y}");
         }
+        let (x, y) = (second_integral(below, x.a), second_integral(above, y.a));
+        assert!((x - y).abs() < 1e-13, "{x} {y}");
         let (x, y) = (k_and_slope(below), k_and_slope(above));
         assert!((x.0 - y.0).abs() < 1e-13 && (x.1 - y.1).abs() < 1e-11, "{x:?} {y:?}");
     }
@@ -82,6 +93,7 @@ mod tests {
     fn values_at_zero_are_the_limits() {
         let x = exponential(0.0);
         assert_eq!((x.cos_half, x.sin_half, x.a, x.b), (1.0, 0.5, 0.5, 1.0 / 6.0));
+        assert_eq!(second_integral(0.0, 0.5), 1.0 / 24.0);
         assert_eq!(k_and_slope(0.0), (1.0 / 12.0, 1.0 / 360.0));
     }
 }

@@ -65,6 +65,19 @@ impl<T: Scalar> So3<T> {
         let e = small_angle::exponential(omega.norm_squared());
         Self(UnitQuaternion::new_unchecked(Quaternion::from_parts(e.cos_half, omega * e.sin_half)))
     }
+    /// Returns the changes of velocity and of position in one unit of time, for a constant acceleration in a
+    /// frame that turns by `omega` in this time. Both are in the frame at the beginning:
+    /// ∫ Exp(s ω) a ds and ∫ (1 - s) Exp(s ω) a ds, for s from 0 to 1.
+    pub fn integrals(omega: &Vector3<T>, acceleration: &Vector3<T>) -> (Vector3<T>, Vector3<T>) {
+        let theta2 = omega.norm_squared();
+        let e = small_angle::exponential(theta2);
+        let once = omega.cross(acceleration);
+        let twice = omega.cross(&once);
+        (
+            acceleration + once * e.a + twice * e.b,
+            acceleration * T::from(0.5) + once * e.b + twice * small_angle::second_integral(theta2, e.a),
+        )
+    }
     /// Returns the shortest rotation vector, in radians.
     pub fn log(&self) -> Vector3<T> {
         self.log_and_k().0
@@ -273,6 +286,19 @@ mod tests {
         fn exp_is_the_matrix_exponential(omega in rotation_vector()) {
             let expected = omega.cross_matrix().exp();
             prop_assert!((So3::exp(&omega).matrix() - expected).norm() < 1e-12);
+        }
+
+        #[test]
+        fn integrals_are_those_of_the_exponential(omega in rotation_vector(), a in vector::<3>(10.0)) {
+            // the columns of exp [ω]× a 0; 0 0 1; 0 0 0 are the rotation and the two integrals
+            let mut generator = nalgebra::Matrix5::zeros();
+            generator.fixed_view_mut::<3, 3>(0, 0).copy_from(&omega.cross_matrix());
+            generator.fixed_view_mut::<3, 1>(0, 3).copy_from(&a);
+            generator[(3, 4)] = 1.0;
+            let expected = generator.exp();
+            let (velocity, position) = So3::integrals(&omega, &a);
+            prop_assert!((velocity - expected.fixed_view::<3, 1>(0, 3)).norm() < 1e-10);
+            prop_assert!((position - expected.fixed_view::<3, 1>(0, 4)).norm() < 1e-10);
         }
 
         #[test]

@@ -126,7 +126,7 @@ mod tests {
 
     jacobian_laws! {
         jacobians_agree: (any_visible_point(), vector::<2>(500.0), any_se3()).prop_map(|(point, pixel, pose)| {
-            let factor = Projection { pixel: Coordinates::new(pixel).unwrap(), camera: camera(-0.27, 0.57) };
+            let factor = Projection::new(Coordinates::new(pixel).unwrap(), camera(-0.27, 0.57));
             (factor, pose, Point3::new(pose.act(&point)))
         })
     }
