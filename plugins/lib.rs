@@ -2,7 +2,7 @@
 //!
 //! # Imports
 //! - [`prelude`]: the names that most programs and all plugins need, as used on this page.
-//! - [`geometry`], [`quadric`], [`semantic`]: variables and factors. [`expression`] creates factors from
+//! - [`geometry`], [`quadric`], [`semantic`], [`inertial`]: variables and factors. [`expression`] creates factors from
 //!   formulas.
 //! - [`config`]: graphs as documents. [`solve`] and [`graph`]: the complete core, for solvers and tools.
 //! - `formats`, `slam` and `viz`, enabled by the cargo feature of that name or `full`: files, runs and pictures.
@@ -125,6 +125,8 @@ pub use manifactor_expression as expression;
 pub use manifactor_formats as formats;
 #[cfg(feature = "geometry")]
 pub use manifactor_geometry as geometry;
+#[cfg(feature = "inertial")]
+pub use manifactor_inertial as inertial;
 #[cfg(feature = "quadric")]
 pub use manifactor_quadric as quadric;
 #[cfg(feature = "semantic")]
@@ -160,6 +162,8 @@ use manifactor_expression as _;
 use manifactor_formats as _;
 #[cfg(feature = "geometry")]
 use manifactor_geometry as _;
+#[cfg(feature = "inertial")]
+use manifactor_inertial as _;
 #[cfg(feature = "quadric")]
 use manifactor_quadric as _;
 #[cfg(feature = "semantic")]

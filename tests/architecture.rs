@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// From the bottom up: a plugin may depend on the plugins before it.
-const PLUGINS: [&str; 16] = [
+const PLUGINS: [&str; 17] = [
     "geometry",
+    "inertial",
     "quadric",
     "semantic",
     "formats",

@@ -152,7 +152,7 @@ const TAKEN: [&str; 15] = [
 
 /// Crate names that would clash: crates of Rust, of the workspace and of a plugin's manifest, and the build
 /// script.
-const CRATES: [&str; 35] = [
+const CRATES: [&str; 36] = [
     "alloc",
     "build",
     "core",
@@ -173,6 +173,7 @@ const CRATES: [&str; 35] = [
     "manifactor_fuzz",
     "manifactor_geometry",
     "manifactor_graph",
+    "manifactor_inertial",
     "manifactor_mapping",
     "manifactor_metrics",
     "manifactor_online",
