@@ -1,7 +1,7 @@
 //! The command line.
 use crate::commands::{
     Check, CheckFactor, CheckManifold, Completions, Evaluate, Experiment, Explain, Inspect, Learn, List, Man,
-    New, Online, Plot, Replay, Run, Schema, ShowGraph, Simulate, Solve,
+    New, Online, Plot, Replay, Run, Schema, ShowGraph, Simulate, Solve, Vio,
 };
 use crate::failure::Failure;
 use crate::output::text::count;
@@ -47,6 +47,7 @@ enum Command {
     Experiment(Experiment),
     Solve(Solve),
     Replay(Replay),
+    Vio(Vio),
     Check(Check),
     CheckFactor(CheckFactor),
     CheckManifold(CheckManifold),
@@ -86,6 +87,7 @@ impl Cli {
             Command::Experiment(command) => command.run(),
             Command::Solve(command) => command.run(self.verbose),
             Command::Replay(command) => command.run(),
+            Command::Vio(command) => command.run(self.verbose),
             Command::Check(command) => command.run(),
             Command::CheckFactor(command) => command.run(),
             Command::CheckManifold(command) => command.run(),

@@ -1,15 +1,15 @@
-//! File formats: g2o, TORO, BAL, TUM trajectories, detections, tables.
+//! File formats: g2o, TORO, BAL, TUM trajectories, detections, inertial measurements, tables.
 //!
 //! No reader skips any content silently. A malformed line is an error with file and line. All errors of a
 //! file are reported together. Content omitted on purpose is counted in a report. Blank lines, `#` comments,
 //! repeated spaces and CRLF are accepted everywhere.
 // Files are untrusted input: no index is taken for granted.
 #![warn(clippy::indexing_slicing)]
-pub mod accelerometer;
 pub mod bal;
 pub mod detections;
 mod error;
 mod graph_format;
+pub mod inertial;
 mod lines;
 pub mod pose_graph;
 pub mod replay;
@@ -20,7 +20,9 @@ pub mod tum;
 pub mod whole;
 
 pub use error::{BadLine, FormatError, Malformed, Mistake};
+
 pub use graph_format::{GraphFormat, GraphRead, GraphWriter, InformationRepair, ReadOptions};
+pub use inertial::accelerometer;
 pub use pose_graph::g2o;
 pub use text::{STDIN, plausible, read_text, words};
 pub use whole::journal;

@@ -7,7 +7,10 @@
 mod imu;
 mod preintegration;
 mod samples;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
+pub mod visual;
 
 pub use imu::Imu;
 pub use preintegration::{Preintegration, RelativeMotion};
-pub use samples::{ImuDensities, ImuSample, SampleError};
+pub use samples::{CoverageError, ImuDensities, ImuReading, ImuSample, SampleError};

@@ -1,9 +1,8 @@
 //! Preintegration: the samples between two states as one relative motion.
 use crate::samples::{ImuDensities, ImuSample, SampleError};
 use manifactor_geometry::{ImuBias, So3};
-use manifactor_graph::{Jet, Manifold, Scalar};
-use nalgebra::{SMatrix, SVector, Vector3};
-use num_dual::DualSVec64;
+use manifactor_graph::{Jet, JetOf, Manifold, Scalar};
+use nalgebra::{Const, SMatrix, SVector, Vector3};
 
 /// Directions of one step: rotation, position and velocity before it, rate and acceleration.
 const DIRECTIONS: usize = 15;
@@ -125,7 +124,7 @@ impl Preintegration {
         force: &Vector3<f64>,
         seconds: f64,
     ) -> SMatrix<f64, 9, DIRECTIONS> {
-        type J = DualSVec64<DIRECTIONS>;
+        type J = JetOf<Const<DIRECTIONS>>;
         let seed = |x: &Vector3<f64>, first: usize| {
             Vector3::from_fn(|i, _| {
                 let unit = SVector::<f64, DIRECTIONS>::from_fn(|k, _| if k == first + i { 1.0 } else { 0.0 });

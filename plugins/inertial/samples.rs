@@ -20,6 +20,94 @@ pub struct ImuSample {
     pub accelerometer: Vector3<f64>,
 }
 
+/// A reading of an inertial measurement unit, in its frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImuReading {
+    /// Timestamp, in seconds.
+    pub timestamp: f64,
+    /// Rate of rotation, in rad/s.
+    pub gyroscope: Vector3<f64>,
+    /// Specific force, in m/s²: acceleration minus gravity. At rest it points up, with a length of 9.8 m/s².
+    pub accelerometer: Vector3<f64>,
+}
+
+impl ImuReading {
+    /// Returns the reading at a time between this one and `to`, by linear interpolation.
+    fn at(&self, to: &Self, timestamp: f64) -> Self {
+        let share = (timestamp - self.timestamp) / (to.timestamp - self.timestamp);
+        Self {
+            timestamp,
+            gyroscope: self.gyroscope.lerp(&to.gyroscope, share),
+            accelerometer: self.accelerometer.lerp(&to.accelerometer, share),
+        }
+    }
+
+    /// Returns the samples from one time to another. Each is the mean of two readings, or of interpolated
+    /// readings at the ends.
+    ///
+    /// # Errors
+    /// If the readings do not cover the time, or two of them are more than `max_gap` seconds apart.
+    pub fn samples(
+        readings: &[Self],
+        from: f64,
+        to: f64,
+        max_gap: f64,
+    ) -> Result<Vec<ImuSample>, CoverageError> {
+        let first = readings.partition_point(|reading| reading.timestamp <= from).saturating_sub(1);
+        let end = readings.partition_point(|reading| reading.timestamp < to);
+        let (Some(begin), Some(last)) = (readings.first(), readings.last()) else {
+            return Err(CoverageError::Missing { from, to });
+        };
+        if begin.timestamp > from || last.timestamp < to || to <= from {
+            return Err(CoverageError::Missing { from, to });
+        }
+        let mut samples = vec![];
+        for pair in readings.get(first..=end).unwrap_or_default().windows(2) {
+            let [a, b] = pair else { continue };
+            let gap = b.timestamp - a.timestamp;
+            if gap > max_gap {
+                return Err(CoverageError::Gap { after: a.timestamp, gap, max_gap });
+            }
+            let (begin, end) = (a.timestamp.max(from), b.timestamp.min(to));
+            if end > begin {
+                let (begin, end) = (a.at(b, begin), a.at(b, end));
+                samples.push(ImuSample {
+                    seconds: end.timestamp - begin.timestamp,
+                    gyroscope: (begin.gyroscope + end.gyroscope) * 0.5,
+                    accelerometer: (begin.accelerometer + end.accelerometer) * 0.5,
+                });
+            }
+        }
+        Ok(samples)
+    }
+}
+
+/// The reason why readings do not cover a time.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CoverageError {
+    /// There are no readings for a part of the time.
+    #[error(
+        "the readings of the IMU do not cover the time from {from:.3} to {to:.3} s: check the clocks of IMU and camera"
+    )]
+    Missing {
+        /// Begin of the time.
+        from: f64,
+        /// End of the time.
+        to: f64,
+    },
+    /// Two readings are too far apart.
+    #[error("the IMU has no reading for {gap:.3} s after {after:.3} s, expected gaps of at most {max_gap} s")]
+    Gap {
+        /// Time of the reading before the gap.
+        after: f64,
+        /// Length of the gap, in seconds.
+        gap: f64,
+        /// Largest gap, in seconds.
+        max_gap: f64,
+    },
+}
+
 /// The reason why samples cannot be integrated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]

@@ -14,6 +14,8 @@ pub(crate) enum InputKind {
     GraphText,
     /// The document of a run.
     Run,
+    /// The document of a visual-inertial recording.
+    VisualInertial,
     /// The document of an experiment.
     Experiment,
     /// A file of semantic rules.
@@ -40,6 +42,7 @@ impl InputKind {
         let has = |field| matches!(&document.root().value, Value::Table(table) if table.contains_key(field));
         // a run may have variables and factors too
         match () {
+            () if has("imu") && has("tracks") => Some(Self::VisualInertial),
             () if has("source") => Some(Self::Run),
             () if has("axes") => Some(Self::Experiment),
             () if has("variables") || has("factors") => Some(Self::Graph),
@@ -91,6 +94,7 @@ impl InputKind {
         match self {
             Self::Graph | Self::GraphText => "a graph",
             Self::Run => "the document of a run",
+            Self::VisualInertial => "the document of a visual-inertial recording",
             Self::Experiment => "the document of an experiment",
             Self::Rules => "a file of semantic rules",
             Self::Frames => "frames as lines of JSON",
@@ -113,6 +117,7 @@ impl InputKind {
             Self::Run => format!(
                 "`manifactor run {path}` computes it and writes the graph of each variant, `manifactor check {path}` checks it"
             ),
+            Self::VisualInertial => format!("`manifactor vio {path}` estimates its motion"),
             Self::Experiment => {
                 format!("`manifactor experiment {path}` runs it, `manifactor check {path}` checks it")
             }
@@ -165,6 +170,9 @@ pub(crate) struct Expected {
 
 /// Input of `run`, `online` and `simulate`.
 pub(crate) const RUN: Expected = Expected { name: "the document of a run", kinds: &[InputKind::Run] };
+/// Input of `vio`.
+pub(crate) const VIO: Expected =
+    Expected { name: "the document of a visual-inertial recording", kinds: &[InputKind::VisualInertial] };
 /// Input of `experiment`.
 pub(crate) const EXPERIMENT: Expected =
     Expected { name: "the document of an experiment", kinds: &[InputKind::Experiment] };

@@ -1,0 +1,198 @@
+//! `manifactor vio`: estimates the motion of a camera with an IMU.
+use crate::failure::Failure;
+use crate::input::document;
+use crate::input::kind;
+use crate::interrupt;
+use crate::output;
+use crate::output::text::count;
+use crate::output::watch::Watch;
+use crate::status::Status;
+use clap::Args;
+use manifactor::config::{Document, Errors};
+use manifactor::formats::inertial::{Tracks, read_imu, read_states, read_tracks};
+use manifactor::formats::tum::{self, StampedPose};
+use manifactor::geometry::{Camera, CameraModel};
+use manifactor::inertial::ImuReading;
+use manifactor::inertial::visual::{
+    InertialState, VisualInertial, VisualInertialDocument, VisualInertialEstimate,
+};
+use manifactor::nalgebra::Vector2;
+use manifactor::slam::metrics::{Alignment, MetricsError, absolute_error, align, associate};
+use manifactor::slam::output::{OutputFolder, write_whole};
+use manifactor::solve::{AllObservers, Interrupt, Observer};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Estimate the motion of a camera with an IMU, from its readings and from tracked points.
+///
+/// The smoother adds every n-th image as a keyframe; at the end, all keyframes are solved as one batch. The
+/// folder has trajectory.txt (the batch), trajectory_online.txt (each keyframe as of its own update), both in
+/// the TUM format, and states.csv with velocities and biases.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manifactor vio v1_01.toml --out out/v1_01")]
+pub(crate) struct Vio {
+    /// The document: files, camera and settings.
+    config: PathBuf,
+    /// Set a value of the document, such as `settings.every=5`.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// The folder for the results. Default: the one in the document.
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write into a folder that holds other files, and overwrite files with the same names.
+    #[arg(long)]
+    force: bool,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// An image: its time and its tracked points.
+type Image = (f64, Vec<(u64, Vector2<f64>)>);
+
+impl Vio {
+    pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
+        let mut document = document::open(&self.config, kind::VIO)?;
+        document.set(&self.set)?;
+        let document = read(&document)?;
+        let folder = self.config.parent().unwrap_or(Path::new("."));
+        let readings = read_imu(folder.join(&document.imu))?;
+        let tracks = read_tracks(folder.join(&document.tracks))?;
+        let truth = document.ground_truth.as_ref().map(|path| read_truth(&folder.join(path))).transpose()?;
+        let out = self.out.as_ref().unwrap_or(&document.output);
+        let _claimed = OutputFolder::claim(out, "vio", &self.config, self.force)?;
+        let keyframes = keyframes(&tracks, &document.camera, document.settings.every.get());
+        let mut interrupt = interrupt::on_ctrl_c();
+        let clock = Instant::now();
+        let Some(estimation) = estimate(&document, &keyframes, &readings, verbose, &mut interrupt)? else {
+            return Ok(Status::Interrupted);
+        };
+        let seconds = clock.elapsed().as_secs_f64();
+        let mut watch = Watch::new(verbose, "solving");
+        let mut observer = AllObservers(vec![&mut watch, &mut interrupt]);
+        let estimate = estimation.finish(&mut observer).map_err(Failure::input)?;
+        drop(watch);
+        let online = estimation.causal_states();
+        write_whole(&out.join("trajectory.txt"), tum::format(&trajectory(&estimate.states)))?;
+        write_whole(&out.join("trajectory_online.txt"), tum::format(&trajectory(online)))?;
+        write_whole(&out.join("states.csv"), states(&estimate.states))?;
+        let errors = truth
+            .map(|truth| Ok::<_, MetricsError>([error(&truth, online)?, error(&truth, &estimate.states)?]));
+        let errors = errors.transpose().map_err(Failure::input)?;
+        self.print(&estimate, seconds, errors, out);
+        Ok(Status::from(&estimate.outcome.termination))
+    }
+
+    fn print(&self, estimate: &VisualInertialEstimate, seconds: f64, errors: Option<[f64; 2]>, out: &Path) {
+        let VisualInertialEstimate { states, outcome, landmarks, short_tracks } = estimate;
+        let milliseconds = 1e3 * seconds / states.len().max(1) as f64;
+        if self.json {
+            output::print_json(&json!({
+                "keyframes": states.len(),
+                "landmarks": landmarks,
+                "short_tracks": short_tracks,
+                "milliseconds_per_keyframe": milliseconds,
+                "termination": outcome.termination,
+                "final_cost": outcome.final_cost,
+                "online_ate": errors.map(|errors| errors[0]),
+                "ate": errors.map(|errors| errors[1]),
+            }));
+            return;
+        }
+        let mut text = format!(
+            "{}, {}, {} without a landmark\n{milliseconds:.1} ms per keyframe\nbatch: {}\n",
+            count(states.len(), "keyframe"),
+            count(*landmarks, "landmark"),
+            count(*short_tracks, "track"),
+            outcome.termination
+        );
+        if let Some([online, whole]) = errors {
+            text += &format!("ATE {:.2} cm online, {:.2} cm for the batch\n", 100.0 * online, 100.0 * whole);
+        }
+        output::print(&(text + &format!("Written to {}\n", out.display())));
+    }
+}
+
+fn read(document: &Document) -> Result<VisualInertialDocument, Failure> {
+    let errors = Errors::new();
+    let read = document.section(&errors).and_then(|section| section.rest());
+    Ok(errors.finish(read)?)
+}
+
+/// Reads true poses, from CSV as in EuRoC or in the TUM format.
+fn read_truth(path: &Path) -> Result<Vec<StampedPose>, Failure> {
+    let is_csv = path.extension().is_some_and(|extension| extension == "csv");
+    Ok(if is_csv { read_states(path)? } else { tum::read(path)?.poses })
+}
+
+/// Returns every n-th image, with pixels.
+fn keyframes(tracks: &Tracks, camera: &Camera, every: usize) -> Vec<Image> {
+    let mut images: Vec<Image> = vec![];
+    for row in &tracks.rows {
+        let pixel = match tracks.is_normalized {
+            true => camera.project(&row.point.push(1.0)),
+            false => row.point,
+        };
+        match images.last_mut().filter(|(timestamp, _)| *timestamp == row.timestamp) {
+            Some((_, points)) => points.push((row.landmark, pixel)),
+            None => images.push((row.timestamp, vec![(row.landmark, pixel)])),
+        }
+    }
+    images.into_iter().step_by(every).collect()
+}
+
+/// Adds all keyframes to the smoother. `None` after an interrupt.
+fn estimate(
+    document: &VisualInertialDocument,
+    keyframes: &[Image],
+    readings: &[ImuReading],
+    verbose: u8,
+    interrupt: &mut Interrupt,
+) -> Result<Option<VisualInertial>, Failure> {
+    let VisualInertialDocument { settings, camera, body_from_camera, .. } = document;
+    // the first image with readings before it
+    let begins = readings.first().map_or(f64::INFINITY, |reading| reading.timestamp);
+    let mut keyframes = keyframes.iter().skip_while(|(timestamp, _)| *timestamp < begins);
+    let Some((timestamp, points)) = keyframes.next() else {
+        return Err(Failure::with_help(
+            "no image lies within the readings of the IMU",
+            "check that both files use the same clock, and the same unit of time",
+        ));
+    };
+    let begun = VisualInertial::begin(settings.clone(), *camera, *body_from_camera, *timestamp, readings);
+    let mut estimation = begun.map_err(Failure::input)?;
+    estimation.see(points.iter().copied());
+    let mut watch = Watch::new(verbose, "keyframes");
+    for (timestamp, points) in keyframes {
+        watch.show(&format!("{timestamp:.2} s"));
+        estimation.add_keyframe(*timestamp, points.iter().copied(), readings).map_err(Failure::input)?;
+        if interrupt.poll().is_break() {
+            return Ok(None);
+        }
+    }
+    Ok(Some(estimation))
+}
+
+fn trajectory(states: &[InertialState]) -> Vec<StampedPose> {
+    states.iter().map(|state| StampedPose { timestamp: state.timestamp, pose: state.pose }).collect()
+}
+
+/// Returns velocities and biases as CSV.
+fn states(states: &[InertialState]) -> String {
+    let mut text = String::from("timestamp,vx,vy,vz,bgx,bgy,bgz,bax,bay,baz\n");
+    for state in states {
+        let numbers = state.velocity.iter().chain(state.bias.iter()).map(|x| format!(",{x}"));
+        text += &format!("{}{}\n", state.timestamp, numbers.collect::<String>());
+    }
+    text
+}
+
+/// Returns the absolute trajectory error after alignment by a rigid motion, in metres.
+fn error(truth: &[StampedPose], states: &[InertialState]) -> Result<f64, MetricsError> {
+    /// Largest time difference between two matched poses, in seconds.
+    const WITHIN: f64 = 0.02;
+    let pairs = associate(truth, &trajectory(states), WITHIN)?;
+    let (_, pairs) = align(&pairs, Alignment::Se3)?;
+    Ok(absolute_error(&pairs)?.rmse)
+}
