@@ -135,6 +135,7 @@ impl Cli {
             Command::Experiment(command) => command.json,
             Command::Solve(command) => command.json,
             Command::Replay(command) => command.json,
+            Command::Vio(command) => command.json,
             Command::Check(command) => command.json,
             Command::CheckFactor(command) => command.json,
             Command::CheckManifold(command) => command.json,

@@ -46,10 +46,10 @@ struct Document {
     gyroscope: Vec<Coordinates<3>>,
     /// Specific forces, in m/s²: acceleration minus gravity.
     accelerometer: Vec<Coordinates<3>>,
-    /// Noise densities of the IMU. Default: those of a small MEMS sensor.
+    /// Noise densities of the IMU. Default: a small MEMS sensor.
     #[serde(default)]
     noise: ImuDensities,
-    /// Bias for the integration, close to that of the solution. Default: zero.
+    /// Bias for the integration, close to the solution. Default: zero.
     #[serde(default, skip_serializing_if = "is_zero")]
     bias: BiasDocument,
     /// Gravity in the world, in m/s². Default: 9.81 m/s² along -z.
@@ -83,7 +83,7 @@ fn is_earth(gravity: &Coordinates<3>) -> bool {
 }
 
 impl Imu {
-    /// Preintegrates samples, which follow each other without gaps. `bias` should be close to that of the
+    /// Preintegrates samples, which follow each other without gaps. `bias` should be close to the
     /// solution. `gravity` is in the world, in m/s².
     ///
     /// # Errors

@@ -12,7 +12,7 @@ const DIRECTIONS: usize = 15;
 pub struct RelativeMotion<T: Scalar = f64> {
     /// Rotates directions from the frame at the end to the frame at the beginning.
     pub rotation: So3<T>,
-    /// Change of position beyond that of the initial velocity, in metres.
+    /// Change of position without the part due to the initial velocity, in metres.
     pub position: Vector3<T>,
     /// Change of velocity, in m/s.
     pub velocity: Vector3<T>,
@@ -43,8 +43,8 @@ impl<T: Scalar> RelativeMotion<T> {
 /// the biases, so that a new bias needs no second integration.
 ///
 /// Errors are in the order rotation (rad), position (m), velocity (m/s), bias of the gyroscope (rad/s), bias of
-/// the accelerometer (m/s²). Those of the motion are in the frame at the end for the rotation, and in the frame
-/// at the beginning otherwise. See Forster, Carlone, Dellaert and Scaramuzza, *On-Manifold Preintegration for
+/// the accelerometer (m/s²). Errors of the rotation are in the frame at the end, those of position and velocity in the frame
+/// at the beginning. See Forster, Carlone, Dellaert and Scaramuzza, *On-Manifold Preintegration for
 /// Real-Time Visual-Inertial Odometry*, T-RO 2017. Samples hold for their whole duration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Preintegration {

@@ -41,7 +41,7 @@ pub struct VisualInertialSettings {
     /// Robust loss of tracked points, since tracks may slip to a different point. Default: Geman-McClure with
     /// scale 3.
     pub loss: Arc<dyn Loss>,
-    /// Noise densities of the IMU. Default: those of a small MEMS sensor.
+    /// Noise densities of the IMU. Default: a small MEMS sensor.
     pub noise: ImuDensities,
     /// Largest time between two readings of the IMU, in seconds. Default: 0.1.
     pub max_gap: Positive,
@@ -158,7 +158,7 @@ const REST_SIGMA: f64 = 0.05;
 /// Standard deviation of the gyroscope's bias from the readings at rest, in rad/s.
 const GYROSCOPE_BIAS_SIGMA: f64 = 5e-3;
 
-/// Median motion of points, beyond that of a rotation, up to which the camera stands still. A share of the standard
+/// Median motion of points, beyond a rotation, up to which the camera stands still. A share of the standard
 /// deviation of a point.
 const STANDING_SHARE: f64 = 0.5;
 /// Minimum number of points that show it.
@@ -273,7 +273,7 @@ impl VisualInertial {
     }
 
     /// Returns whether the camera stands still since the last keyframe: a rotation alone explains how its points
-    /// have moved. `rotation` is that of the IMU.
+    /// have moved. `rotation` is the turn of the IMU.
     fn is_standing(&self, rotation: &So3, points: &[(u64, Vector2<f64>)]) -> bool {
         let mounting = &self.body_from_camera.rotation;
         // the rotation of the camera
@@ -354,7 +354,7 @@ impl VisualInertial {
         })
     }
 
-    /// Returns the state of each keyframe as of its own update, which knows nothing of later keyframes.
+    /// Returns the state of each keyframe as of its own update, without later keyframes.
     pub fn causal_states(&self) -> &[InertialState] {
         &self.states
     }

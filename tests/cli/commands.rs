@@ -1,7 +1,6 @@
 //! Each command: its arguments and its results.
 mod check;
 mod documents;
-mod evaluate;
 pub(crate) mod experiment;
 mod graph;
 mod laws;
@@ -9,6 +8,7 @@ mod maps;
 mod names;
 mod new;
 pub(crate) mod online;
+mod recordings;
 mod replay;
 mod run;
 mod schema;

@@ -92,8 +92,10 @@ pub struct Descent<'a> {
     /// Evaluation of the last trial step.
     pub(crate) trial: Evaluation,
     pub(crate) iterations: usize,
-    /// Relative change of the cost that ends the solve.
-    pub(crate) relative_cost: f64,
+    /// Change of the cost by the last accepted step.
+    change: f64,
+    /// The termination at a minimum from which steps continue to rounding error.
+    settled: Option<Termination>,
     /// Diagonal of H at the initial estimate.
     initial_diagonal: Vec<f64>,
     observer: &'a mut dyn Observer,
@@ -125,7 +127,8 @@ impl<'a> Descent<'a> {
         problem.times = Times { compile, ..Times::default() };
         let at = problem.linearize();
         let mut descent = Self {
-            relative_cost: stop.relative_cost(problem.dim()),
+            change: f64::INFINITY,
+            settled: None,
             initial_diagonal: problem.system.diagonal().copied().collect(),
             problem,
             stop,
@@ -236,7 +239,7 @@ impl<'a> Descent<'a> {
         } else if gradient <= *self.stop.gradient * self.unit() {
             Some(Termination::Converged { reason: Tolerance::Gradient })
         } else if self.iterations >= self.stop.max_iterations {
-            Some(Termination::MaxIterations)
+            Some(self.settled.clone().unwrap_or(Termination::MaxIterations))
         } else {
             None
         }
@@ -310,7 +313,7 @@ impl<'a> Descent<'a> {
 
     /// Returns whether a change of the cost is within the relative tolerance.
     pub(crate) fn is_small(&self, change: f64) -> bool {
-        change.abs() <= self.relative_cost * self.at.cost.abs()
+        change.abs() <= self.stop.relative_cost() * self.at.cost.abs()
     }
 
     /// Returns the reason for the lack of an acceptable step, from the last trial step, which is almost
@@ -328,6 +331,8 @@ impl<'a> Descent<'a> {
         let Evaluation { cost, became_undefined, not_finite, .. } = self.trial;
         let reason = if self.interrupted {
             return Termination::Interrupted;
+        } else if let Some(settled) = &self.settled {
+            return settled.clone();
         } else if became_undefined > 0 {
             Stall::Domain
         } else if !cost.is_finite() {
@@ -343,6 +348,22 @@ impl<'a> Descent<'a> {
         Termination::Stalled { reason }
     }
 
+    /// Returns whether a solve that has reached a minimum ends. `change` is the change of the cost that shows it.
+    /// A small solve continues to rounding error; if its iterations run out, it has converged.
+    pub(crate) fn ends(&mut self, termination: &Termination, change: f64) -> bool {
+        let continues = *termination == Termination::Converged { reason: Tolerance::RelativeCost }
+            && change.abs() > self.stop.exact_cost(self.problem.dim()) * self.at.cost.abs();
+        if continues {
+            self.settled = Some(termination.clone());
+        }
+        !continues
+    }
+
+    /// Returns the change of the cost by the last accepted step.
+    pub(crate) fn change(&self) -> f64 {
+        self.change
+    }
+
     /// Accepts the last trial step, and linearizes there. Returns a reason to stop, if there is one.
     pub fn accept(&mut self, step: &TrialStep) -> Option<Termination> {
         self.problem.model.accept();
@@ -350,6 +371,11 @@ impl<'a> Descent<'a> {
         let inactive = self.at.inactive;
         self.at = self.problem.linearize();
         self.trial = self.at;
+        self.change = (before - after).abs();
+        let is_small = self.change <= self.stop.relative_cost() * before.abs();
+        if !is_small {
+            self.settled = None;
+        }
         if let Some(termination) = self.not_finite() {
             return Some(termination);
         }
@@ -357,7 +383,7 @@ impl<'a> Descent<'a> {
         if self.at.inactive != inactive {
             return None;
         }
-        let reason = if (before - after).abs() <= self.relative_cost * before.abs() {
+        let reason = if is_small {
             Tolerance::RelativeCost
         } else if step.norm <= *self.stop.step {
             Tolerance::Step

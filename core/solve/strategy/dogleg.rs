@@ -148,12 +148,17 @@ impl Dogleg {
                         _ => within,
                     });
                     match descent.accept(&step) {
-                        Some(termination) if !is_cut => return termination,
+                        Some(termination) if !is_cut && descent.ends(&termination, descent.change()) => {
+                            return termination;
+                        }
                         _ => continue 'linearized,
                     }
                 }
                 if !is_cut && !matches!(tried, TrialResult::Undefined) && descent.shows_no_decrease(&step) {
-                    return Termination::Converged { reason: Tolerance::RelativeCost };
+                    let settled = Termination::Converged { reason: Tolerance::RelativeCost };
+                    if descent.ends(&settled, step.predicted) {
+                        return settled;
+                    }
                 }
                 if step.norm <= *descent.stop.step {
                     return match is_cut || descent.is_steep() {

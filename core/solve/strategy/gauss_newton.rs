@@ -91,7 +91,9 @@ fn iterate(descent: &mut Descent<'_>, best: &mut Best) -> Termination {
         // a step that is small because of halvings does not show convergence
         let is_cut = halvings > 0 && !descent.is_small(step.predicted);
         match descent.accept(&step) {
-            Some(termination) if !is_cut => return termination,
+            Some(termination) if !is_cut && descent.ends(&termination, descent.change()) => {
+                return termination;
+            }
             _ => {}
         }
         best.update(descent);

@@ -189,7 +189,9 @@ impl LevenbergMarquardt {
                                 small_before = false;
                             }
                             Some(termination)
-                                if small && (small_before || step.control <= MAX_LIGHT_LAMBDA) =>
+                                if small
+                                    && (small_before || step.control <= MAX_LIGHT_LAMBDA)
+                                    && descent.ends(&termination, descent.change()) =>
                             {
                                 return termination;
                             }
@@ -211,7 +213,10 @@ impl LevenbergMarquardt {
                     if let Some(reason) = reason.filter(|_| is_trusted)
                         && !doubt.is_some_and(|share| descent.predicts_decrease(&mut step, share))
                     {
-                        return Termination::Converged { reason };
+                        let settled = Termination::Converged { reason };
+                        if descent.ends(&settled, step.predicted) {
+                            return settled;
+                        }
                     }
                 }
                 if descent.interrupted() {

@@ -49,7 +49,7 @@ pub struct Stopping {
     /// Maximum number of linearizations.
     pub max_iterations: usize,
     /// Stop once a step changes the cost by less than this share of it. Default: 1e-8. With at most 32
-    /// unknowns, where further steps cost little: 1e-15, which is rounding error.
+    /// unknowns, steps continue to 1e-15, which is rounding error, as long as there are iterations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relative_cost: Option<NotNegative>,
     /// Stop once the cost is below this.
@@ -72,16 +72,18 @@ impl Default for Stopping {
     }
 }
 
-/// Maximum number of unknowns for which a solve continues down to rounding error.
-const MAX_SMALL: usize = 32;
-
 impl Stopping {
-    /// Returns the relative change of the cost that ends a solve with this number of unknowns.
-    pub(crate) fn relative_cost(&self, unknowns: usize) -> f64 {
+    /// Returns the relative change of the cost that shows a minimum.
+    pub(crate) fn relative_cost(&self) -> f64 {
+        self.relative_cost.map_or(1e-8, |share| *share)
+    }
+    /// Returns the relative change of the cost down to which a solve with this number of unknowns continues.
+    pub(crate) fn exact_cost(&self, unknowns: usize) -> f64 {
+        /// Maximum number of unknowns for which further steps cost little.
+        const MAX_SMALL: usize = 32;
         match self.relative_cost {
-            Some(share) => *share,
             None if unknowns <= MAX_SMALL => 1e-15,
-            None => 1e-8,
+            _ => self.relative_cost(),
         }
     }
 }

@@ -2,6 +2,7 @@
 use crate::input::graph_file;
 use crate::reference::fields::{Field, fields};
 use manifactor::config::Definitions;
+use manifactor::inertial::visual::VisualInertialDocument;
 use manifactor::slam::schema::{experiment_root, rules_root, run_root};
 use serde_json::Value;
 
@@ -20,7 +21,7 @@ pub(crate) struct DocumentKind {
 }
 
 /// All kinds of documents, in the order of the reference.
-pub(crate) static DOCUMENTS: [DocumentKind; 4] = [
+pub(crate) static DOCUMENTS: [DocumentKind; 5] = [
     DocumentKind {
         name: "graph",
         title: "A literal graph",
@@ -91,6 +92,17 @@ options = [
 by = ["views"]
 metrics = ["position", "shape"]"#,
         root: experiment_root,
+    },
+    DocumentKind {
+        name: "visual-inertial",
+        title: "A visual-inertial recording",
+        about: "The readings of an IMU and the tracked points of a camera, in files beside the document. `manifactor vio` \
+                estimates its motion.",
+        example: r#"imu = "imu.csv"
+tracks = "tracks.csv"
+camera = { fx = 458.7, fy = 457.3, cx = 367.2, cy = 248.4, width = 752, height = 480 }
+body_from_camera = { translation = [-0.022, -0.065, 0.01], rotation = [0.0, 0.0, 0.6, 0.8] }"#,
+        root: |definitions| definitions.of::<VisualInertialDocument>(),
     },
 ];
 

@@ -48,7 +48,7 @@ impl Descent<'_> {
         let Termination::Converged { reason } = termination else { return false };
         let is_zero = *reason == Tolerance::AbsoluteCost && self.at.inactive == 0;
         if is_zero
-            || self.relative_cost > MAX_TOLERANCE
+            || self.stop.relative_cost() > MAX_TOLERANCE
             || self.escapes >= MAX_ESCAPES
             || self.gradient().is_empty()
         {
@@ -227,7 +227,7 @@ impl Descent<'_> {
     fn descend_along(&mut self, direction: &[f64]) -> bool {
         let steps = self.probe_steps();
         let Some(share) = shortest(direction, &steps) else { return false };
-        let enough = self.at.cost * (1.0 - self.relative_cost.max(ROUNDING_SHARE));
+        let enough = self.at.cost * (1.0 - self.stop.relative_cost().max(ROUNDING_SHARE));
         let mut best: Option<(f64, Vec<f64>)> = None;
         for sign in [1.0, -1.0] {
             let mut size = sign * share;

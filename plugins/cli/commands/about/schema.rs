@@ -28,6 +28,8 @@ enum Choice {
     Experiment,
     /// A file of semantic rules, which a run refers to.
     Rules,
+    /// A visual-inertial recording, the input of `vio`.
+    VisualInertial,
 }
 
 impl Schema {
@@ -39,6 +41,7 @@ impl Schema {
             Choice::Run => kind("run"),
             Choice::Experiment => kind("experiment"),
             Choice::Rules => kind("rules"),
+            Choice::VisualInertial => kind("visual-inertial"),
         };
         let mut definitions = Definitions::new();
         let root = match one {

@@ -1,0 +1,3 @@
+//! Commands on recordings and trajectories.
+mod evaluate;
+mod vio;

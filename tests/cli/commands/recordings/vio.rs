@@ -1,0 +1,96 @@
+//! Visual-inertial estimation of a simulated flight.
+use crate::{folder, manifactor, path};
+use manifactor::inertial::testing::SimulatedFlight;
+
+/// Returns the files of a flight: readings, tracks, true poses and a document.
+fn files() -> [String; 4] {
+    let flight = SimulatedFlight::new(8.0, 1);
+    let mut imu =
+        String::from("#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y,w_RS_S_z,a_RS_S_x,a_RS_S_y,a_RS_S_z\n");
+    for reading in &flight.readings {
+        let [wx, wy, wz] = reading.gyroscope.into();
+        let [ax, ay, az] = reading.accelerometer.into();
+        let nanoseconds = (reading.timestamp * 1e9).round();
+        imu += &format!("{nanoseconds},{wx},{wy},{wz},{ax},{ay},{az}\n");
+    }
+    let mut tracks = String::from("timestamp,landmark,u,v\n");
+    for (timestamp, points) in &flight.images {
+        for (landmark, pixel) in points {
+            tracks += &format!("{timestamp},{landmark},{},{}\n", pixel.x, pixel.y);
+        }
+    }
+    let mut truth = String::from("#timestamp,px,py,pz,qw,qx,qy,qz\n");
+    for ((timestamp, _), pose) in flight.images.iter().zip(&flight.poses) {
+        let [x, y, z] = pose.translation.into();
+        let [qx, qy, qz, qw] = pose.rotation.quaternion_xyzw();
+        truth += &format!("{timestamp},{x},{y},{z},{qw},{qx},{qy},{qz}\n");
+    }
+    let [qx, qy, qz, qw] = flight.body_from_camera.rotation.quaternion_xyzw();
+    let document = format!(
+        "imu = \"imu.csv\"\ntracks = \"tracks.csv\"\nground_truth = \"truth.csv\"\n\
+         camera = {{ fx = 450.0, fy = 450.0, cx = 376.0, cy = 240.0, width = 752, height = 480 }}\n\
+         body_from_camera = {{ translation = [0.05, 0.1, 0.0], rotation = [{qx}, {qy}, {qz}, {qw}] }}\n"
+    );
+    [imu, tracks, truth, document]
+}
+
+#[test]
+fn a_flight_is_estimated_from_its_files() {
+    let [imu, tracks, truth, document] = files();
+    let files = [("imu.csv", &*imu), ("tracks.csv", &tracks), ("truth.csv", &truth), ("vio.toml", &document)];
+    let folder = folder(&files);
+    let (document, out) = (path(&folder, "vio.toml"), path(&folder, "out"));
+    let json = manifactor(&format!("vio {document} --out {out} --json")).ended(0).json();
+    assert!(json["ate"].as_f64().unwrap() < 0.02, "{json}");
+    assert!(json["online_ate"].as_f64().unwrap() < 0.05, "{json}");
+    assert_eq!(json["keyframes"], 54);
+    let states = std::fs::read_to_string(path(&folder, "out/states.csv")).unwrap();
+    assert_eq!(states.lines().count(), 55);
+    // the trajectory is one that `evaluate` reads
+    let truth: String = SimulatedFlight::new(8.0, 1)
+        .images
+        .iter()
+        .zip(SimulatedFlight::new(8.0, 1).poses)
+        .map(|((timestamp, _), pose)| {
+            let ([x, y, z], [qx, qy, qz, qw]) = (pose.translation.into(), pose.rotation.quaternion_xyzw());
+            format!("{timestamp} {x} {y} {z} {qx} {qy} {qz} {qw}\n")
+        })
+        .collect();
+    std::fs::write(path(&folder, "truth.txt"), truth).unwrap();
+    let evaluate = format!("evaluate {} {out}/trajectory.txt --json", path(&folder, "truth.txt"));
+    let evaluated = manifactor(&evaluate).ended(0).json();
+    let difference = evaluated["ate"]["rmse"].as_f64().unwrap() - json["ate"].as_f64().unwrap();
+    assert!(difference.abs() < 1e-6, "{evaluated}");
+    // the command for a document of a different kind
+    manifactor(&format!("run {document}"))
+        .ended(2)
+        .complains("is the document of a visual-inertial recording");
+}
+
+#[test]
+fn mistakes_of_a_recording_are_named() {
+    let [imu, tracks, truth, document] = files();
+    let complaint = |imu: &str, tracks: &str, document: &str, text: &str| {
+        let files = [("imu.csv", imu), ("tracks.csv", tracks), ("truth.csv", &truth), ("vio.toml", document)];
+        let folder = folder(&files);
+        let (document, out) = (path(&folder, "vio.toml"), path(&folder, "out"));
+        let ran = manifactor(&format!("vio {document} --out {out}"));
+        assert!([2, 3].contains(&ran.code), "{}", ran.stderr);
+        ran.complains(text);
+    };
+    let without = imu.replace("a_RS_S_z", "vertical");
+    complaint(&without, &tracks, &document, "the header has no column az");
+    let late: String =
+        tracks.lines().take(1).chain(tracks.lines().skip(4000)).map(|l| format!("{l}\n")).collect();
+    let late = late.replacen("\n", "\n1000,1,3,4\n", 1);
+    complaint(&imu, &late, &document, "time stamps have to increase");
+    let moving = imu.lines().take(1).chain(imu.lines().skip(600)).collect::<Vec<_>>().join("\n");
+    complaint(&moving, &tracks, &document, "begin where it is at rest");
+    complaint(&imu, &tracks, &document.replace("ground_truth", "groundtruth"), "ground_truth");
+    complaint(
+        &imu,
+        &tracks,
+        &format!("{document}settings = {{ sigma = -1.0 }}\n"),
+        "expected a finite number above zero",
+    );
+}
