@@ -30,7 +30,7 @@ use std::time::Instant;
 /// folder has trajectory.txt (the batch), trajectory_online.txt (each keyframe as of its own update), both in
 /// the TUM format, and states.csv with velocities and biases.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  manifactor vio v1_01.toml --out out/v1_01")]
+#[command(after_help = "Example:\n  manifactor vio examples/flight/vio.toml --out out/flight")]
 pub(crate) struct Vio {
     /// The document: files, camera and settings.
     config: PathBuf,

@@ -1,8 +1,8 @@
 //! Visual-inertial estimation of a simulated flight.
-use crate::{folder, manifactor, path};
+use crate::{folder, manifactor, path, root};
 use manifactor::inertial::testing::SimulatedFlight;
 
-/// Returns the files of a flight: readings, tracks, true poses and a document.
+/// Returns the files of a flight: readings, tracks and true poses, and the document of the example.
 fn files() -> [String; 4] {
     let flight = SimulatedFlight::new(8.0, 1);
     let mut imu =
@@ -11,27 +11,30 @@ fn files() -> [String; 4] {
         let [wx, wy, wz] = reading.gyroscope.into();
         let [ax, ay, az] = reading.accelerometer.into();
         let nanoseconds = (reading.timestamp * 1e9).round();
-        imu += &format!("{nanoseconds},{wx},{wy},{wz},{ax},{ay},{az}\n");
+        imu += &format!("{nanoseconds},{wx:.5},{wy:.5},{wz:.5},{ax:.4},{ay:.4},{az:.4}\n");
     }
     let mut tracks = String::from("timestamp,landmark,u,v\n");
     for (timestamp, points) in &flight.images {
         for (landmark, pixel) in points {
-            tracks += &format!("{timestamp},{landmark},{},{}\n", pixel.x, pixel.y);
+            tracks += &format!("{timestamp},{landmark},{:.2},{:.2}\n", pixel.x, pixel.y);
         }
     }
     let mut truth = String::from("#timestamp,px,py,pz,qw,qx,qy,qz\n");
     for ((timestamp, _), pose) in flight.images.iter().zip(&flight.poses) {
         let [x, y, z] = pose.translation.into();
         let [qx, qy, qz, qw] = pose.rotation.quaternion_xyzw();
-        truth += &format!("{timestamp},{x},{y},{z},{qw},{qx},{qy},{qz}\n");
+        truth += &format!("{timestamp},{x:.6},{y:.6},{z:.6},{qw:.6},{qx:.6},{qy:.6},{qz:.6}\n");
     }
-    let [qx, qy, qz, qw] = flight.body_from_camera.rotation.quaternion_xyzw();
-    let document = format!(
-        "imu = \"imu.csv\"\ntracks = \"tracks.csv\"\nground_truth = \"truth.csv\"\n\
-         camera = {{ fx = 450.0, fy = 450.0, cx = 376.0, cy = 240.0, width = 752, height = 480 }}\n\
-         body_from_camera = {{ translation = [0.05, 0.1, 0.0], rotation = [{qx}, {qy}, {qz}, {qw}] }}\n"
-    );
-    [imu, tracks, truth, document]
+    [imu, tracks, truth, std::fs::read_to_string(root().join("examples/flight/vio.toml")).unwrap()]
+}
+
+#[test]
+fn the_example_is_the_simulated_flight() {
+    let expected = files();
+    for (name, expected) in ["imu.csv", "tracks.csv", "truth.csv"].into_iter().zip(expected) {
+        let found = std::fs::read_to_string(root().join("examples/flight").join(name)).unwrap_or_default();
+        assert!(found == expected, "examples/flight/{name} differs from the simulation");
+    }
 }
 
 #[test]
@@ -90,7 +93,7 @@ fn mistakes_of_a_recording_are_named() {
     complaint(
         &imu,
         &tracks,
-        &format!("{document}settings = {{ sigma = -1.0 }}\n"),
+        &document.replace("output =", "settings = { sigma = -1.0 }\noutput ="),
         "expected a finite number above zero",
     );
 }
