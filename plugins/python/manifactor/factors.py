@@ -34,6 +34,7 @@ __all__ = [
     "expression",
     "horizontal_orientation",
     "horizontal_orientation_smooth",
+    "imu",
     "landmark_se2",
     "landmark_se3",
     "max_mixture",
@@ -43,6 +44,7 @@ __all__ = [
     "point_inside",
     "position_se2",
     "position_se3",
+    "prior_imu_bias",
     "prior_plane",
     "prior_point1",
     "prior_point2",
@@ -53,6 +55,7 @@ __all__ = [
     "prior_so2",
     "prior_so3",
     "prior_twist",
+    "prior_velocity",
     "projection",
     "projection_bal",
     "projection_double_sphere",
@@ -675,6 +678,46 @@ def horizontal_orientation_smooth(*, up: Numbers | None = None) -> Factor:
     return Factor("horizontal_orientation_smooth", {"up": up})
 
 
+def imu(
+    *,
+    seconds: Numbers,
+    gyroscope: Sequence[Numbers],
+    accelerometer: Sequence[Numbers],
+    noise: types.ImuDensities | None = None,
+    bias: types.ImuBias | None = None,
+    gravity: Numbers | None = None,
+) -> Factor:
+    """The samples of an inertial measurement unit between two states, preintegrated.
+
+    Variables: pose xᵢ and velocity vᵢ of the IMU in the world, its bias bᵢ, and the same at the end. With
+    (ΔR, Δp, Δv) integrated over the duration T and corrected for the bias bᵢ:
+    r = W (Log(ΔRᵀ RᵢᵀRⱼ), Rᵢᵀ(pⱼ - pᵢ - vᵢT - ½gT²) - Δp, Rᵢᵀ(vⱼ - vᵢ - gT) - Δv, bⱼ - bᵢ). W whitens by the
+    covariance that `noise` implies, so the `noise` of the factor stays at unit. Source: Forster, Carlone,
+    Dellaert and Scaramuzza, *On-Manifold Preintegration*, T-RO 2017.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "v0", "b0", "x1", "v1", "b1"]
+
+    [factors.factor]
+    type = "imu"
+    seconds = [0.005, 0.005, 0.005]
+    gyroscope = [[0.1, 0.0, 0.2], [0.1, 0.0, 0.2], [0.1, 0.0, 0.25]]
+    accelerometer = [[0.2, 0.0, 9.8], [0.2, 0.1, 9.8], [0.2, 0.1, 9.7]]
+    noise = { gyroscope = 1.7e-4, accelerometer = 2e-3, gyroscope_walk = 2e-5, accelerometer_walk = 3e-3 }
+    ```
+
+    Args:
+        seconds: Duration of each sample, in seconds.
+        gyroscope: Rates of rotation, in rad/s.
+        accelerometer: Specific forces, in m/s²: acceleration minus gravity.
+        noise: Noise densities of the IMU. Default: a small MEMS sensor.
+        bias: Bias for the integration, close to the solution. Default: zero.
+        gravity: Gravity in the world, in m/s². Default: 9.81 m/s² along -z.
+    """
+    return Factor("imu", {"seconds": seconds, "gyroscope": gyroscope, "accelerometer": accelerometer, "noise": noise, "bias": bias, "gravity": gravity})
+
+
 def landmark_se2(*, position: Numbers) -> Factor:
     """The point is at `position`, seen from the pose: r = Rᵀ(p - t) - z.
 
@@ -900,6 +943,24 @@ def position_se3(*, position: Numbers, lever_arm: Numbers | None = None) -> Fact
     return Factor("position_se3", {"position": position, "lever_arm": lever_arm})
 
 
+def prior_imu_bias(*, value: variables.ImuBias | Fields) -> Factor:
+    """The variable is close to `value`: r = Log(Z⁻¹X).
+
+    One row for each tangent direction (gx, gy, gz, ax, ay, az). Two rotations that are half a turn apart have two shortest ways between them: there the residual jumps.
+
+    ```toml
+    [[factors]]
+    keys = ["x0"]
+    factor = { type = "prior_imu_bias", value = { gyroscope = [0.0, 0.02, 0.08], accelerometer = [0.0, 0.1, 0.05] } }
+    noise = { sigma = 0.1 }
+    ```
+
+    Args:
+        value: Expected value of the variable.
+    """
+    return Factor("prior_imu_bias", {"value": untagged(value)})
+
+
 def prior_plane(*, value: variables.Plane | Fields) -> Factor:
     """A prior on a plane: r = (n - n₀, offset - offset₀), in radians and metres.
 
@@ -1085,10 +1146,28 @@ def prior_twist(*, value: variables.Twist | Fields) -> Factor:
     return Factor("prior_twist", {"value": untagged(value)})
 
 
-def projection(*, pixel: Numbers, camera: types.Camera) -> Factor:
+def prior_velocity(*, value: variables.Velocity | Fields) -> Factor:
+    """The variable is close to `value`: r = Log(Z⁻¹X).
+
+    One row for each tangent direction (vx, vy, vz). Two rotations that are half a turn apart have two shortest ways between them: there the residual jumps.
+
+    ```toml
+    [[factors]]
+    keys = ["x0"]
+    factor = { type = "prior_velocity", value = { linear = [0.1, 0.0, 0.5] } }
+    noise = { sigma = 0.1 }
+    ```
+
+    Args:
+        value: Expected value of the variable.
+    """
+    return Factor("prior_velocity", {"value": untagged(value)})
+
+
+def projection(*, pixel: Numbers, camera: types.Camera, body_from_camera: types.Se3 | None = None) -> Factor:
     """The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
 
-    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. With `body_from_camera`, the pose is that of a body on which the camera is mounted. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
 
     ```toml
     [[factors]]
@@ -1100,8 +1179,10 @@ def projection(*, pixel: Numbers, camera: types.Camera) -> Factor:
     Args:
         pixel: Measured pixel, x right and y down.
         camera: The calibrated camera.
+        body_from_camera: Pose of the camera in the frame of the variable. Default: the variable is the
+            pose of the camera.
     """
-    return Factor("projection", {"pixel": pixel, "camera": camera})
+    return Factor("projection", {"pixel": pixel, "camera": camera, "body_from_camera": body_from_camera})
 
 
 def projection_bal(*, pixel: Numbers) -> Factor:
@@ -1125,10 +1206,15 @@ def projection_bal(*, pixel: Numbers) -> Factor:
     return Factor("projection_bal", {"pixel": pixel})
 
 
-def projection_double_sphere(*, pixel: Numbers, camera: types.DoubleSphere) -> Factor:
+def projection_double_sphere(
+    *,
+    pixel: Numbers,
+    camera: types.DoubleSphere,
+    body_from_camera: types.Se3 | None = None,
+) -> Factor:
     """The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
 
-    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. With `body_from_camera`, the pose is that of a body on which the camera is mounted. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
 
     ```toml
     [[factors]]
@@ -1140,14 +1226,21 @@ def projection_double_sphere(*, pixel: Numbers, camera: types.DoubleSphere) -> F
     Args:
         pixel: Measured pixel, x right and y down.
         camera: The calibrated camera.
+        body_from_camera: Pose of the camera in the frame of the variable. Default: the variable is the
+            pose of the camera.
     """
-    return Factor("projection_double_sphere", {"pixel": pixel, "camera": camera})
+    return Factor("projection_double_sphere", {"pixel": pixel, "camera": camera, "body_from_camera": body_from_camera})
 
 
-def projection_extended_unified(*, pixel: Numbers, camera: types.ExtendedUnified) -> Factor:
+def projection_extended_unified(
+    *,
+    pixel: Numbers,
+    camera: types.ExtendedUnified,
+    body_from_camera: types.Se3 | None = None,
+) -> Factor:
     """The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
 
-    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. With `body_from_camera`, the pose is that of a body on which the camera is mounted. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
 
     ```toml
     [[factors]]
@@ -1159,14 +1252,21 @@ def projection_extended_unified(*, pixel: Numbers, camera: types.ExtendedUnified
     Args:
         pixel: Measured pixel, x right and y down.
         camera: The calibrated camera.
+        body_from_camera: Pose of the camera in the frame of the variable. Default: the variable is the
+            pose of the camera.
     """
-    return Factor("projection_extended_unified", {"pixel": pixel, "camera": camera})
+    return Factor("projection_extended_unified", {"pixel": pixel, "camera": camera, "body_from_camera": body_from_camera})
 
 
-def projection_kannala_brandt(*, pixel: Numbers, camera: types.KannalaBrandt) -> Factor:
+def projection_kannala_brandt(
+    *,
+    pixel: Numbers,
+    camera: types.KannalaBrandt,
+    body_from_camera: types.Se3 | None = None,
+) -> Factor:
     """The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
 
-    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. With `body_from_camera`, the pose is that of a body on which the camera is mounted. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
 
     ```toml
     [[factors]]
@@ -1178,14 +1278,21 @@ def projection_kannala_brandt(*, pixel: Numbers, camera: types.KannalaBrandt) ->
     Args:
         pixel: Measured pixel, x right and y down.
         camera: The calibrated camera.
+        body_from_camera: Pose of the camera in the frame of the variable. Default: the variable is the
+            pose of the camera.
     """
-    return Factor("projection_kannala_brandt", {"pixel": pixel, "camera": camera})
+    return Factor("projection_kannala_brandt", {"pixel": pixel, "camera": camera, "body_from_camera": body_from_camera})
 
 
-def projection_radial_tangential(*, pixel: Numbers, camera: types.RadialTangential) -> Factor:
+def projection_radial_tangential(
+    *,
+    pixel: Numbers,
+    camera: types.RadialTangential,
+    body_from_camera: types.Se3 | None = None,
+) -> Factor:
     """The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
 
-    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. With `body_from_camera`, the pose is that of a body on which the camera is mounted. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
 
     ```toml
     [[factors]]
@@ -1197,8 +1304,10 @@ def projection_radial_tangential(*, pixel: Numbers, camera: types.RadialTangenti
     Args:
         pixel: Measured pixel, x right and y down.
         camera: The calibrated camera.
+        body_from_camera: Pose of the camera in the frame of the variable. Default: the variable is the
+            pose of the camera.
     """
-    return Factor("projection_radial_tangential", {"pixel": pixel, "camera": camera})
+    return Factor("projection_radial_tangential", {"pixel": pixel, "camera": camera, "body_from_camera": body_from_camera})
 
 
 def range_se2_point2(*, range: float) -> Factor:

@@ -40,8 +40,8 @@ def auto(*, stop: types.Stopping | None = None, linear: types.LinearSolver | Non
     ```
 
     Args:
-        stop: Stopping criteria, for each start. Default: {"max_iterations": 100, "relative_cost": 1e-08,
-            "absolute_cost": 1e-20, "gradient": 1e-12, "step": 1e-12}.
+        stop: Stopping criteria, for each start. Default: {"max_iterations": 100, "absolute_cost": 1e-20,
+            "gradient": 1e-12, "step": 1e-12}.
         linear: Solver of the linear system of each step. Default: {"method": "auto", "ordering": "auto",
             "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi", "tolerance":
             1e-06, "max_iterations": 1000}}.
@@ -69,8 +69,8 @@ def dogleg(
     Args:
         initial_radius: Radius of the first step, in standard deviations. Default: the length of the first
             Gauss-Newton step.
-        stop: Stopping criteria. Default: {"max_iterations": 100, "relative_cost": 1e-08, "absolute_cost":
-            1e-20, "gradient": 1e-12, "step": 1e-12}.
+        stop: Stopping criteria. Default: {"max_iterations": 100, "absolute_cost": 1e-20, "gradient":
+            1e-12, "step": 1e-12}.
         linear: Solver of the linear system of each step. Default: {"method": "auto", "ordering": "auto",
             "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi", "tolerance":
             1e-06, "max_iterations": 1000}}.
@@ -90,8 +90,8 @@ def gauss_newton(*, stop: types.Stopping | None = None, linear: types.LinearSolv
     ```
 
     Args:
-        stop: Stopping criteria. Default: {"max_iterations": 100, "relative_cost": 1e-08, "absolute_cost":
-            1e-20, "gradient": 1e-12, "step": 1e-12}.
+        stop: Stopping criteria. Default: {"max_iterations": 100, "absolute_cost": 1e-20, "gradient":
+            1e-12, "step": 1e-12}.
         linear: Solver of the linear system of each step. Default: {"method": "auto", "ordering": "auto",
             "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi", "tolerance":
             1e-06, "max_iterations": 1000}}.
@@ -137,9 +137,9 @@ def gnc(
         inliers: Factors that are always trusted, by index in the graph, from 0.
         step: Factor between consecutive values of μ; 1.4 in the paper. Default: 2.0.
         solver: Solver for the final weights. Default: {"type": "auto", "stop": {"max_iterations": 100,
-            "relative_cost": 1e-08, "absolute_cost": 1e-20, "gradient": 1e-12, "step": 1e-12}, "linear":
-            {"method": "auto", "ordering": "auto", "refinements": 0, "conjugate_gradients":
-            {"preconditioner": "schur_jacobi", "tolerance": 1e-06, "max_iterations": 1000}}}.
+            "absolute_cost": 1e-20, "gradient": 1e-12, "step": 1e-12}, "linear": {"method": "auto",
+            "ordering": "auto", "refinements": 0, "conjugate_gradients": {"preconditioner":
+            "schur_jacobi", "tolerance": 1e-06, "max_iterations": 1000}}}.
     """
     return Solver("gnc", {"cost": cost, "probability": probability, "threshold": threshold, "candidates": candidates, "types": types, "inliers": inliers, "step": step, "solver": solver})
 
@@ -170,8 +170,8 @@ def levenberg_marquardt(
         max_lambda: Maximum damping, at which a solve gives up. Default: 1000000000000.0.
         decrease: Largest factor by which a successful step lowers the damping. Default: 10.0.
         diagonal: Lower and upper bound of the diagonal entries for damping. Default: [1e-06, 1e+32].
-        stop: Stopping criteria. Default: {"max_iterations": 100, "relative_cost": 1e-08, "absolute_cost":
-            1e-20, "gradient": 1e-12, "step": 1e-12}.
+        stop: Stopping criteria. Default: {"max_iterations": 100, "absolute_cost": 1e-20, "gradient":
+            1e-12, "step": 1e-12}.
         linear: Solver of the linear system of each step. Default: {"method": "auto", "ordering": "auto",
             "refinements": 0, "conjugate_gradients": {"preconditioner": "schur_jacobi", "tolerance":
             1e-06, "max_iterations": 1000}}.

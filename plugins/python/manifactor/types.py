@@ -28,6 +28,29 @@ class Camera(TypedDict, total=False):
     height: Required[int]
 
 
+class ImuDensities(TypedDict, total=False):
+    """Noise of an IMU: spectral densities, as in its datasheet or from its Allan variance."""
+
+    #: White noise of the gyroscope, in rad/s/√Hz.
+    gyroscope: float
+    #: White noise of the accelerometer, in m/s²/√Hz.
+    accelerometer: float
+    #: Random walk of the gyroscope's bias, in rad/s²/√Hz.
+    gyroscope_walk: float
+    #: Random walk of the accelerometer's bias, in m/s³/√Hz.
+    accelerometer_walk: float
+
+
+class ImuBias(TypedDict, total=False):
+    """The bias of an inertial measurement unit: the gyroscope's in rad/s, then the accelerometer's in m/s². A
+    measurement is the true value, plus the bias, plus noise."""
+
+    #: Bias of the gyroscope about x, y and z, in rad/s.
+    gyroscope: Required[Numbers]
+    #: Bias of the accelerometer along x, y and z, in m/s².
+    accelerometer: Required[Numbers]
+
+
 class Component(TypedDict, total=False):
     """One alternative of a mixture."""
 
@@ -40,6 +63,16 @@ class Component(TypedDict, total=False):
     over: Numbers
     #: Noise model of the factor's residual.
     noise: Noise
+
+
+class Se3(TypedDict, total=False):
+    """A pose in space, X·Exp(ω, v): tangent (rx, ry, rz, x, y, z), in radians and metres, in the local
+    frame."""
+
+    #: Position, in metres.
+    translation: Required[Numbers]
+    #: Unit quaternion (x, y, z, w).
+    rotation: Required[Numbers]
 
 
 class DoubleSphere(TypedDict, total=False):
@@ -127,7 +160,8 @@ class Stopping(TypedDict, total=False):
 
     #: Maximum number of linearizations.
     max_iterations: int
-    #: Stop once a step changes the cost by less than this share of it.
+    #: Stop once a step changes the cost by less than this share of it. Default: 1e-8. With at most 32
+    #: unknowns, steps continue to 1e-15, which is rounding error, as long as there are iterations.
     relative_cost: float
     #: Stop once the cost is below this.
     absolute_cost: float

@@ -16,6 +16,7 @@ from .groups import Group, SpatialRotation, Vector
 __all__ = [
     "BalCamera",
     "DualQuadric",
+    "ImuBias",
     "Plane",
     "Point1",
     "Point2",
@@ -26,6 +27,7 @@ __all__ = [
     "So2",
     "So3",
     "Twist",
+    "Velocity",
 ]
 
 
@@ -157,6 +159,41 @@ class DualQuadric(Variable):
     def pose(self) -> Se3:
         """The pose of an object, from its local frame to the outer one."""
         return computed(self, "pose")  # type: ignore[no-any-return]
+
+
+class ImuBias(Variable):
+    """The bias of an inertial measurement unit: the gyroscope's in rad/s, then the accelerometer's in m/s².
+    A measurement is the true value, plus the bias, plus noise.
+
+    Tangent (gx, gy, gz, ax, ay, az); x ⊞ δ = x + δ.
+
+    ```toml
+    [values]
+    b0 = { type = "imu_bias", gyroscope = [0.0, 0.02, 0.08], accelerometer = [0.0, 0.1, 0.05] }
+    ```
+
+    Args:
+        gyroscope: Bias of the gyroscope about x, y and z, in rad/s.
+        accelerometer: Bias of the accelerometer along x, y and z, in m/s².
+    """
+
+    TYPE: ClassVar[str] = "imu_bias"
+    SHAPE: ClassVar[str] = ""
+    TANGENT: ClassVar[tuple[str, ...]] = ("gx", "gy", "gz", "ax", "ay", "az")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {}
+
+    def __new__(cls, *, gyroscope: Numbers, accelerometer: Numbers) -> Self:
+        return super().__new__(cls, "variable", "imu_bias", {"gyroscope": gyroscope, "accelerometer": accelerometer})
+
+    @property
+    def gyroscope(self) -> NDArray[np.float64]:
+        """Bias of the gyroscope about x, y and z, in rad/s."""
+        return self.__getattr__("gyroscope")  # type: ignore[no-any-return]
+
+    @property
+    def accelerometer(self) -> NDArray[np.float64]:
+        """Bias of the accelerometer along x, y and z, in m/s²."""
+        return self.__getattr__("accelerometer")  # type: ignore[no-any-return]
 
 
 class Plane(Variable):
@@ -819,10 +856,39 @@ class Twist(Variable):
         return self.__getattr__("linear")  # type: ignore[no-any-return]
 
 
+class Velocity(Variable):
+    """The velocity of a point in the world frame, in m/s.
+
+    Tangent (vx, vy, vz); x ⊞ δ = x + δ.
+
+    ```toml
+    [values]
+    v0 = { type = "velocity", linear = [0.1, 0.0, 0.5] }
+    ```
+
+    Args:
+        linear: Velocity along x, y and z, in m/s.
+    """
+
+    TYPE: ClassVar[str] = "velocity"
+    SHAPE: ClassVar[str] = ""
+    TANGENT: ClassVar[tuple[str, ...]] = ("vx", "vy", "vz")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {}
+
+    def __new__(cls, *, linear: Numbers) -> Self:
+        return super().__new__(cls, "variable", "velocity", {"linear": linear})
+
+    @property
+    def linear(self) -> NDArray[np.float64]:
+        """Velocity along x, y and z, in m/s."""
+        return self.__getattr__("linear")  # type: ignore[no-any-return]
+
+
 #: The class of each type of variables, by its name in documents.
 BY_TYPE: dict[str, type[Variable]] = {
     "bal_camera": BalCamera,
     "dual_quadric": DualQuadric,
+    "imu_bias": ImuBias,
     "plane": Plane,
     "point1": Point1,
     "point2": Point2,
@@ -833,4 +899,5 @@ BY_TYPE: dict[str, type[Variable]] = {
     "so2": So2,
     "so3": So3,
     "twist": Twist,
+    "velocity": Velocity,
 }

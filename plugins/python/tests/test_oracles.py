@@ -74,7 +74,7 @@ def measured(seconds: Array, rates: Array, forces: Array, bias: Array) -> Array:
     )
     graph.add(["x0", "v0", "b0", "x1", "v1", "b1"], imu)
     solution = mf.solve(graph, values)
-    end, velocity = solution["x1"], solution["v1"]
+    end, velocity = solution.values["x1"], solution.values["v1"]
     return np.concatenate([end.log()[:3], end.translation, velocity.linear])
 
 
