@@ -276,14 +276,19 @@ impl<'a> Descent<'a> {
         self.largest_cosine().powi(2) > SHARE
     }
 
-    /// Returns whether the slope of the cost along an unknown has vanished on the way, although it has
-    /// factors. An example is the rate of an exponential function that has become so large that its values
-    /// are zero. The gradient is zero there, but it is no minimum.
+    /// Returns whether the slope of the cost along all unknowns of a variable has vanished on the way, although
+    /// the variable has factors. An example is the rate of an exponential function that has become so large
+    /// that its values are zero. The gradient is zero there, but it is no minimum. A single unknown may vanish
+    /// at a minimum, such as the rotation of an ellipsoid that has become round.
     pub(crate) fn has_run_off(&self) -> bool {
         /// Remaining share of the diagonal entry of H below which a residual does not depend on the unknown.
         const MIN_SHARE: f64 = 1e-20;
-        let mut entries = self.problem.system.diagonal().zip(&self.initial_diagonal);
-        entries.any(|(now, initial)| *now < MIN_SHARE * initial)
+        let now: Vec<f64> = self.problem.system.diagonal().copied().collect();
+        let vanished = |i: usize| now[i] < MIN_SHARE * self.initial_diagonal[i];
+        self.problem.model.variables.iter().any(|variable| {
+            let mut unknowns = variable.unknowns().flatten().peekable();
+            unknowns.peek().is_some() && unknowns.all(vanished)
+        })
     }
 
     fn largest_gradient(&self) -> f64 {

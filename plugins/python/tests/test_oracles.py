@@ -70,12 +70,13 @@ def measured(seconds: Array, rates: Array, forces: Array, bias: Array) -> Array:
         seconds=seconds.tolist(),
         gyroscope=rates.tolist(),
         accelerometer=forces.tolist(),
+        bias={"gyroscope": bias[:3].tolist(), "accelerometer": bias[3:].tolist()},
         gravity=[0, 0, 0],
     )
     graph.add(["x0", "v0", "b0", "x1", "v1", "b1"], imu)
     solution = mf.solve(graph, values)
-    end, velocity = solution.values["x1"], solution.values["v1"]
-    return np.concatenate([end.log()[:3], end.translation, velocity.linear])
+    state: tuple[Any, Any] = (solution.values["x1"], solution.values["v1"])
+    return np.concatenate([state[0].log()[:3], state[0].translation, state[1].linear])
 
 
 def extrapolated(of: Callable[[int], Array], levels: int = 4) -> Array:
