@@ -36,7 +36,7 @@ pub fn any_point<const N: usize>() -> impl Strategy<Value = Rn<N>> + Clone {
 pub fn any_twist() -> impl Strategy<Value = Twist> + Clone {
     vector(SIZE).prop_map(Twist)
 }
-/// Returns a strategy for velocities up to [`SIZE`].
+/// Returns a strategy for velocities up to 10 m/s.
 pub fn any_velocity() -> impl Strategy<Value = Velocity> + Clone {
     vector(SIZE).prop_map(Velocity)
 }
