@@ -180,6 +180,8 @@ VALUES: list[Any] = [
     mf.Plane(normal=[0, 0.6, 0.8], offset=0.5),
     mf.DualQuadric(translation=[0, 1, 2], rotation=[0, 0, 0.6, 0.8], semi_axes=[0.1, 0.2, 0.3]),
     mf.Twist(angular=[0, 1, 2], linear=[3, 4, 5]),
+    mf.Velocity(linear=[3, 4, 5]),
+    mf.ImuBias(gyroscope=[0, 1, 2], accelerometer=[3, 4, 5]),
     mf.BalCamera(translation=[0, 1, 2], rotation=[0, 0, 0.6, 0.8], focal_length=500, k1=0.1, k2=0),
 ]
 

@@ -80,9 +80,10 @@ impl CameraModel for DoubleSphere {
     fn sees(&self, point: &Vector3<f64>) -> bool {
         let Self { xi, alpha, .. } = *self;
         let w = if alpha <= 0.5 { alpha / (1.0 - alpha) } else { (1.0 - alpha) / alpha };
-        let limit = (w + xi) / (2.0 * w * xi + xi * xi + 1.0).sqrt();
-        let distance = point.norm();
-        distance > 0.0 && point.z > -limit * distance
+        let (side, distance) = (point.x * point.x + point.y * point.y, point.norm());
+        // beyond this direction in the second sphere, the distance of the pixel from the centre falls again
+        let ahead = xi * distance + point.z;
+        distance > 0.0 && ahead > -w * (side + ahead * ahead).sqrt()
     }
 
     fn pinhole(&self) -> Camera {
