@@ -227,7 +227,7 @@ fn row(record: &StringRecord, header: &StringRecord) -> Result<DetectionRow, Mis
 }
 
 /// Returns the line of a record. csv counts blank lines and comments before a record as part of it.
-fn line(text: &str, position: &csv::Position) -> usize {
+pub(crate) fn line(text: &str, position: &csv::Position) -> usize {
     let rest = text.get(position.byte() as usize..).unwrap_or_default();
     let skipped = rest.lines().take_while(|line| line.is_empty() || line.starts_with('#'));
     position.line() as usize + skipped.count()

@@ -9,9 +9,9 @@ mod columns;
 use crate::error::{FormatError, Mistake, ProblemList};
 use crate::text::read_text;
 use crate::tum::StampedPose;
-use columns::{Column, Columns};
+use columns::Column;
 use manifactor_geometry::{Se3, So3};
-use manifactor_inertial::ImuReading;
+use manifactor_inertial::{ImuReading, MAX_RATE};
 use nalgebra::{Vector2, Vector3};
 use std::path::Path;
 
@@ -27,8 +27,6 @@ const IMU: [Column; 7] = [
     Column { name: "az", others: &["a_RS_S_z", "accel_z", "alpha_z", "linear_acceleration_z"] },
 ];
 
-/// Largest plausible rate, in rad/s.
-const MAX_RATE: f64 = 100.0;
 /// Range of plausible medians of the specific force, in m/s². A sensor in units of g has a median of one.
 const FORCES: [f64; 2] = [3.0, 30.0];
 
@@ -41,9 +39,8 @@ pub fn read_imu(path: impl AsRef<Path>) -> Result<Vec<ImuReading>, FormatError> 
     let path = path.as_ref();
     let text = read_text(path)?;
     let mut problems = ProblemList::of(path, &text);
-    let columns = Columns::read(&text, &IMU, &mut problems);
     let mut rows: Vec<ImuReading> = vec![];
-    for (line, [timestamp, wx, wy, wz, ax, ay, az]) in columns.rows() {
+    for (line, [timestamp, wx, wy, wz, ax, ay, az]) in columns::rows(&text, &IMU, &mut problems) {
         let row = ImuReading {
             timestamp,
             gyroscope: Vector3::new(wx, wy, wz),
@@ -114,10 +111,10 @@ pub fn read_tracks(path: impl AsRef<Path>) -> Result<Tracks, FormatError> {
     let text = read_text(path)?;
     let mut problems = ProblemList::of(path, &text);
     let is_normalized = columns::header(&text).any(|name| name == "u_norm");
-    let columns = Columns::read(&text, if is_normalized { &NORMALIZED } else { &PIXEL }, &mut problems);
+    let wanted = if is_normalized { &NORMALIZED } else { &PIXEL };
     let mut rows: Vec<TrackRow> = vec![];
     let mut seen = std::collections::BTreeSet::new();
-    for (line, [timestamp, landmark, u, v]) in columns.rows() {
+    for (line, [timestamp, landmark, u, v]) in columns::rows(&text, wanted, &mut problems) {
         if landmark < 0.0 || landmark.fract() != 0.0 {
             let field = Mistake::Field {
                 expected: "the number of a landmark, 0 or more",
@@ -163,9 +160,8 @@ pub fn read_states(path: impl AsRef<Path>) -> Result<Vec<StampedPose>, FormatErr
     let path = path.as_ref();
     let text = read_text(path)?;
     let mut problems = ProblemList::of(path, &text);
-    let columns = Columns::read(&text, &STATES, &mut problems);
     let mut poses: Vec<StampedPose> = vec![];
-    for (line, [timestamp, x, y, z, qw, qx, qy, qz]) in columns.rows() {
+    for (line, [timestamp, x, y, z, qw, qx, qy, qz]) in columns::rows(&text, &STATES, &mut problems) {
         let previous = poses.last().map_or(f64::NEG_INFINITY, |pose| pose.timestamp);
         if timestamp <= previous {
             problems.push(line, Mistake::NotIncreasing { previous, found: timestamp });

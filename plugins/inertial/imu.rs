@@ -117,6 +117,19 @@ impl Imu {
         &self.preintegration
     }
 
+    /// Returns pose and velocity at the end of the samples from those at the beginning, for the bias of the
+    /// integration.
+    pub fn predict(&self, pose: &Se3, velocity: &Velocity) -> (Se3, Velocity) {
+        let Preintegration { motion, seconds, .. } = &*self.preintegration;
+        let (time, gravity) = (*seconds, self.gravity());
+        let translation = pose.translation
+            + velocity.0 * time
+            + gravity * (0.5 * time * time)
+            + pose.rotation.act(&motion.position);
+        let velocity = velocity.0 + gravity * time + pose.rotation.act(&motion.velocity);
+        (Se3::new(pose.rotation.compose(&motion.rotation), translation), Velocity(velocity))
+    }
+
     /// Returns gravity in the world, in m/s².
     pub fn gravity(&self) -> Vector3<f64> {
         *self.document.gravity
@@ -269,7 +282,6 @@ register_factor!("imu", Imu);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::preintegration::RelativeMotion;
     use manifactor_geometry::testing::{any_imu_bias, any_se3, any_velocity, se3_tangent};
     use manifactor_testing::{factor_laws, jacobian_laws};
     use proptest::prelude::*;
@@ -308,13 +320,8 @@ mod tests {
             (0..20).map(|k| sample([0.1, f64::from(k) * 0.1, -0.5, 1.0, 2.0, 9.81])).collect();
         let imu = Imu::new(&samples, ImuDensities::default(), bias, earth()).unwrap();
         let (x, v) = (Se3::exp(&Vector6::new(0.3, -0.2, 1.0, 2.0, 3.0, 4.0)), Vector3::new(1.0, -2.0, 0.5));
-        let RelativeMotion { rotation, position, velocity } = imu.preintegration().motion;
-        let time = imu.preintegration().seconds;
-        let translation =
-            x.translation + v * time + imu.gravity() * (0.5 * time * time) + x.rotation.act(&position);
-        let end = Se3::new(x.rotation.compose(&rotation), translation);
-        let after = v + imu.gravity() * time + x.rotation.act(&velocity);
-        let r = imu.residual::<f64>((x, v, bias.0, end, after, bias.0));
+        let (end, after) = imu.predict(&x, &Velocity(v));
+        let r = imu.residual::<f64>((x, v, bias.0, end, after.0, bias.0));
         assert!(r.norm() < 1e-6, "{r}");
     }
 

@@ -13,4 +13,4 @@ pub mod visual;
 
 pub use imu::Imu;
 pub use preintegration::{Preintegration, RelativeMotion};
-pub use samples::{CoverageError, ImuDensities, ImuReading, ImuSample, SampleError};
+pub use samples::{CoverageError, ImuDensities, ImuReading, ImuSample, MAX_RATE, SampleError};

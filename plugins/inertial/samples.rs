@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Largest rate of a gyroscope, in rad/s. The fastest gyroscopes measure up to 4000°/s, which is 70 rad/s.
-const MAX_RATE: f64 = 100.0;
+pub const MAX_RATE: f64 = 100.0;
 /// Largest acceleration, in m/s². Accelerometers of robots measure up to 16 g, those for impacts up to 200 g.
 const MAX_ACCELERATION: f64 = 2000.0;
 

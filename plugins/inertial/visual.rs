@@ -12,15 +12,16 @@ use crate::samples::{CoverageError, ImuDensities, ImuReading, SampleError};
 use initial::at_rest;
 use landmark::Track;
 use manifactor_geometry::{
-    Between, Camera, CameraModel, Coordinates, ImuBias, Point3, Prior, Projection, Se3, So3, Velocity,
+    Between, Camera, CameraModel, Coordinates, CoordinatesError, ImuBias, Point3, Prior, Projection, Se3,
+    So3, Velocity,
 };
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::{GemanMcClure, Loss};
 use manifactor_graph::noise::NoiseError;
-use manifactor_graph::{FactorEntry, Graph, Noise, ValueError, Values};
+use manifactor_graph::{Graph, Noise, ValueError, Values};
 use manifactor_smoother::{ChangeError, Smoother, SmootherSettings, UpdateError};
 use manifactor_solve::{Auto, CompileError, Observer, Outcome};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -105,6 +106,9 @@ pub enum VisualInertialError {
         /// The reason.
         source: SampleError,
     },
+    /// A pixel or gravity is not finite.
+    #[error(transparent)]
+    Coordinates(#[from] CoordinatesError),
     /// A noise model is invalid.
     #[error(transparent)]
     Noise(#[from] NoiseError),
@@ -139,6 +143,9 @@ pub struct VisualInertialEstimate {
     /// Number of tracks that were too short or too close to the direction of motion for a landmark.
     pub short_tracks: usize,
 }
+
+/// The number of a landmark, and its pixel in an undistorted image.
+pub type TrackedPoint = (u64, Vector2<f64>);
 
 /// An estimation in progress.
 pub struct VisualInertial {
@@ -184,16 +191,18 @@ fn landmark_key(landmark: u64) -> String {
 }
 
 impl VisualInertial {
-    /// Begins at the time `timestamp` of the first keyframe, with the IMU at rest. The readings begin there too.
-    /// `body_from_camera` is the pose of the camera in the frame of the IMU.
+    /// Begins at the time `timestamp` of the first keyframe, which sees `points`, with the IMU at rest. `readings`
+    /// cover the time at rest. `body_from_camera` is the pose of the camera in the frame of the IMU. Points are
+    /// pixels of undistorted images, with the number of their landmark.
     ///
     /// # Errors
-    /// If the IMU is not at rest, or a noise model is invalid.
+    /// If the IMU is not at rest, or a point is not finite.
     pub fn begin(
         settings: VisualInertialSettings,
         camera: Camera,
         body_from_camera: Se3,
         timestamp: f64,
+        points: &[TrackedPoint],
         readings: &[ImuReading],
     ) -> Result<Self, VisualInertialError> {
         let state = at_rest(&settings, timestamp, readings)?;
@@ -203,78 +212,83 @@ impl VisualInertial {
         let tilt = settings.accelerometer_bias.get() / settings.gravity.get();
         // rotations about x and y of the world; the prior's rows are in the frame of the IMU
         let rotation = state.pose.rotation.matrix();
-        let mut covariance = nalgebra::DMatrix::from_diagonal_element(6, 6, GAUGE_SIGMA * GAUGE_SIGMA);
+        let mut covariance = DMatrix::from_diagonal_element(6, 6, GAUGE_SIGMA * GAUGE_SIGMA);
         let horizontal = Vector3::new(tilt * tilt, tilt * tilt, GAUGE_SIGMA * GAUGE_SIGMA);
-        let local = rotation.transpose() * nalgebra::Matrix3::from_diagonal(&horizontal) * rotation;
+        let local = rotation.transpose() * Matrix3::from_diagonal(&horizontal) * rotation;
         covariance.view_mut((0, 0), (3, 3)).copy_from(&((local + local.transpose()) * 0.5));
         graph.add([x.as_str()], Prior { value: state.pose }).noise(Noise::covariance(covariance)?);
         graph.add([v.as_str()], Prior { value: state.velocity }).noise(Noise::sigma(REST_SIGMA)?);
         let [g, a] = [GYROSCOPE_BIAS_SIGMA, settings.accelerometer_bias.get()];
         graph.add([b.as_str()], Prior { value: state.bias }).noise(Noise::sigmas(&[g, g, g, a, a, a])?);
         insert(&mut values, 0, &state);
-        let mut smoother = Smoother::new(settings.smoother.clone());
-        smoother.push(&graph, &values)?;
-        Ok(Self {
-            settings,
-            camera,
-            body_from_camera,
-            smoother,
-            states: vec![state],
-            tracks: BTreeMap::new(),
-        })
-    }
-
-    /// Adds the points that the first keyframe sees.
-    pub fn see(&mut self, points: impl IntoIterator<Item = (u64, Vector2<f64>)>) {
-        let keyframe = self.states.len() - 1;
-        for (landmark, pixel) in points {
-            self.tracks.entry(landmark).or_default().push(keyframe, pixel);
-        }
+        let smoother = Smoother::new(settings.smoother.clone());
+        let mut estimation =
+            Self { settings, camera, body_from_camera, smoother, states: vec![], tracks: BTreeMap::new() };
+        estimation.update(&state, points, &graph, &values)?;
+        Ok(estimation)
     }
 
     /// Adds a keyframe with the pixels of its tracked points, and updates the estimate. `readings` cover the
-    /// time since the last keyframe. Returns the state at the keyframe. Points of undistorted images.
+    /// time since the last keyframe. Returns the state at the keyframe.
     ///
     /// # Errors
-    /// If the readings do not cover the time, or the update fails.
+    /// If the readings do not cover the time, a point is not finite, or the update fails. Nothing is added then.
     pub fn add_keyframe(
         &mut self,
         timestamp: f64,
-        points: impl IntoIterator<Item = (u64, Vector2<f64>)>,
+        points: &[TrackedPoint],
         readings: &[ImuReading],
     ) -> Result<InertialState, VisualInertialError> {
         let keyframe = self.states.len();
         let last = self.estimate(keyframe - 1)?;
         let from = last.timestamp;
         let samples = ImuReading::samples(readings, from, timestamp, self.settings.max_gap.get())?;
-        let gravity = Vector3::new(0.0, 0.0, -self.settings.gravity.get());
-        let downward = Coordinates::new(gravity).unwrap_or_default();
-        let imu = Imu::new(&samples, self.settings.noise, last.bias, downward)
+        let gravity = Coordinates::new(Vector3::new(0.0, 0.0, -self.settings.gravity.get()))?;
+        let imu = Imu::new(&samples, self.settings.noise, last.bias, gravity)
             .map_err(|source| VisualInertialError::Sample { from, to: timestamp, source })?;
-        let predicted = predict(&imu, &last, timestamp);
+        let (pose, velocity) = imu.predict(&last.pose, &last.velocity);
+        let predicted = InertialState { timestamp, pose, velocity, bias: last.bias };
         let (mut graph, mut values) = (Graph::new(), Values::new());
         insert(&mut values, keyframe, &predicted);
         let ends = [keys(keyframe - 1), keys(keyframe)];
-        let points: Vec<(u64, Vector2<f64>)> = points.into_iter().collect();
-        if self.is_standing(&imu.preintegration().motion.rotation, &points) {
+        if self.is_standing(&imu.preintegration().motion.rotation, points) {
             stand_still(&mut graph, &ends)?;
         }
         graph.add(ends.iter().flatten().map(String::as_str), imu);
-        self.states.push(predicted);
-        self.see(points);
-        self.add_landmarks(keyframe, &mut graph, &mut values)?;
-        self.smoother.push(&graph, &values)?;
+        let mapped = self.add_landmarks(&pose, points, &mut graph, &mut values)?;
+        let state = self.update(&predicted, points, &graph, &values)?;
+        for landmark in mapped {
+            self.tracks.entry(landmark).or_default().is_mapped = true;
+        }
+        Ok(state)
+    }
+
+    /// Updates the smoother, and adds the keyframe with its points if that succeeds.
+    fn update(
+        &mut self,
+        predicted: &InertialState,
+        points: &[TrackedPoint],
+        graph: &Graph,
+        values: &Values,
+    ) -> Result<InertialState, VisualInertialError> {
+        let (keyframe, timestamp) = (self.states.len(), predicted.timestamp);
+        for (_, pixel) in points {
+            Coordinates::new(*pixel)?;
+        }
+        self.smoother.push(graph, values)?;
         self.smoother.update().map_err(|source| VisualInertialError::Update { timestamp, source })?;
+        self.states.push(*predicted);
         let state = self.estimate(keyframe)?;
-        if let Some(own) = self.states.last_mut() {
-            *own = state;
+        self.states[keyframe] = state;
+        for (landmark, pixel) in points {
+            self.tracks.entry(*landmark).or_default().push(keyframe, *pixel);
         }
         Ok(state)
     }
 
     /// Returns whether the camera stands still since the last keyframe: a rotation alone explains how its points
     /// have moved. `rotation` is the turn of the IMU.
-    fn is_standing(&self, rotation: &So3, points: &[(u64, Vector2<f64>)]) -> bool {
+    fn is_standing(&self, rotation: &So3, points: &[TrackedPoint]) -> bool {
         let mounting = &self.body_from_camera.rotation;
         // the rotation of the camera
         let turn = mounting.inverse().compose(rotation).compose(mounting);
@@ -290,64 +304,54 @@ impl VisualInertial {
             && moved[moved.len() / 2] <= STANDING_SHARE * self.settings.sigma.get()
     }
 
-    /// Adds the new points of landmarks, and the landmarks that can be triangulated now.
+    /// Adds the new points of landmarks, and the landmarks that can be triangulated now. Returns the latter.
+    /// `pose` is the predicted pose of the new keyframe.
     fn add_landmarks(
-        &mut self,
-        keyframe: usize,
+        &self,
+        pose: &Se3,
+        points: &[TrackedPoint],
         graph: &mut Graph,
         values: &mut Values,
-    ) -> Result<(), VisualInertialError> {
-        let noise = Noise::sigma(self.settings.sigma.get())?;
-        let seen = |track: &Track| track.last() == Some(keyframe);
-        let ready: Vec<u64> =
-            self.tracks.iter().filter(|(_, track)| seen(track)).map(|(landmark, _)| *landmark).collect();
-        for landmark in ready {
-            let Some(track) = self.tracks.get(&landmark) else { continue };
-            let key = landmark_key(landmark);
-            let mut points = track.points().to_vec();
-            if track.is_mapped {
-                points.drain(..points.len() - 1);
-            } else {
-                let mut poses = BTreeMap::new();
-                for (keyframe, _) in &points {
-                    poses.insert(*keyframe, self.pose_of_camera(*keyframe)?);
+    ) -> Result<Vec<u64>, VisualInertialError> {
+        let (keyframe, sigma) = (self.states.len(), self.settings.sigma.get());
+        let noise = Noise::sigma(sigma)?;
+        let mut mapped = vec![];
+        for (landmark, pixel) in points {
+            let key = landmark_key(*landmark);
+            let track = self.tracks.get(landmark);
+            let mut seen = vec![(keyframe, *pixel)];
+            if !track.is_some_and(|track| track.is_mapped) {
+                let earlier = track.map_or(&[][..], |track| track.points());
+                let mut views = vec![];
+                for (keyframe, pixel) in earlier {
+                    let [x, ..] = keys(*keyframe);
+                    views.push((self.smoother.get::<Se3>(&x)?.compose(&self.body_from_camera), *pixel));
                 }
-                let sigma = self.settings.sigma.get();
-                let Some(position) = landmark::triangulate(&points, &poses, &self.camera, sigma) else {
-                    continue;
-                };
+                views.push((pose.compose(&self.body_from_camera), *pixel));
+                let Some(position) = landmark::triangulate(&views, &self.camera, sigma) else { continue };
                 values.insert(key.as_str(), Point3::new(position));
+                seen.splice(0..0, earlier.iter().copied());
+                mapped.push(*landmark);
             }
-            for (keyframe, pixel) in points {
+            for (keyframe, pixel) in seen {
                 let factor = Projection {
-                    pixel: Coordinates::new(pixel).unwrap_or_default(),
+                    pixel: Coordinates::new(pixel)?,
                     camera: self.camera,
                     body_from_camera: Some(self.body_from_camera),
                 };
                 let [x, ..] = keys(keyframe);
-                let entry: &mut FactorEntry = graph.add([x.as_str(), key.as_str()], factor);
-                entry.noise(noise.clone()).loss = Some(self.settings.loss.clone());
-            }
-            if let Some(track) = self.tracks.get_mut(&landmark) {
-                track.is_mapped = true;
+                let entry = graph.add([x.as_str(), key.as_str()], factor).noise(noise.clone());
+                entry.loss = Some(self.settings.loss.clone());
             }
         }
-        Ok(())
+        Ok(mapped)
     }
 
-    fn pose_of_camera(&self, keyframe: usize) -> Result<Se3, VisualInertialError> {
-        Ok(self.estimate(keyframe)?.pose.compose(&self.body_from_camera))
-    }
-
-    /// Returns the estimate of a keyframe. One that is not in the smoother yet has its prediction.
+    /// Returns the estimate of a keyframe.
     fn estimate(&self, keyframe: usize) -> Result<InertialState, VisualInertialError> {
         let [x, v, b] = keys(keyframe);
-        let own = self.states[keyframe];
-        if self.smoother.estimate(&x).is_none() {
-            return Ok(own);
-        }
         Ok(InertialState {
-            timestamp: own.timestamp,
+            timestamp: self.states[keyframe].timestamp,
             pose: self.smoother.get(&x)?,
             velocity: self.smoother.get(&v)?,
             bias: self.smoother.get(&b)?,
@@ -391,23 +395,6 @@ fn insert(values: &mut Values, keyframe: usize, state: &InertialState) {
     values.insert(b.as_str(), state.bias);
 }
 
-/// Returns the state at the end of the samples, without noise.
-fn predict(imu: &Imu, from: &InertialState, timestamp: f64) -> InertialState {
-    let preintegration = imu.preintegration();
-    let (motion, time) = (preintegration.motion, preintegration.seconds);
-    let (pose, velocity, gravity) = (&from.pose, from.velocity.0, imu.gravity());
-    let translation = pose.translation
-        + velocity * time
-        + gravity * (0.5 * time * time)
-        + pose.rotation.act(&motion.position);
-    InertialState {
-        timestamp,
-        pose: Se3::new(pose.rotation.compose(&motion.rotation), translation),
-        velocity: Velocity(velocity + gravity * time + pose.rotation.act(&motion.velocity)),
-        bias: from.bias,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -419,10 +406,9 @@ mod tests {
         let (timestamp, points) = images.next().unwrap();
         let (camera, mounting) = (flight.camera, flight.body_from_camera);
         let mut estimation =
-            VisualInertial::begin(settings, camera, mounting, *timestamp, &flight.readings).unwrap();
-        estimation.see(points.iter().copied());
+            VisualInertial::begin(settings, camera, mounting, *timestamp, points, &flight.readings).unwrap();
         for (timestamp, points) in images {
-            estimation.add_keyframe(*timestamp, points.iter().copied(), &flight.readings).unwrap();
+            estimation.add_keyframe(*timestamp, points, &flight.readings).unwrap();
         }
         estimation
     }
@@ -456,20 +442,27 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_of_the_readings_is_named() {
+    fn a_keyframe_that_fails_leaves_the_last_good_state() {
         let mut flight = SimulatedFlight::new(3.0, 0);
+        let every = 3;
+        let whole = flown(&flight, VisualInertialSettings::default());
+        let (images, readings) = (flight.images.clone(), flight.readings.clone());
         flight.readings.retain(|reading| !(2.0..2.2).contains(&reading.timestamp));
         let (camera, mounting) = (flight.camera, flight.body_from_camera);
         let settings = VisualInertialSettings::default();
         let mut estimation =
-            VisualInertial::begin(settings, camera, mounting, 0.0, &flight.readings).unwrap();
-        let mut last = Ok(estimation.causal_states()[0]);
-        for (timestamp, points) in flight.images.iter().skip(1) {
-            if last.is_ok() {
-                last = estimation.add_keyframe(*timestamp, points.iter().copied(), &flight.readings);
+            VisualInertial::begin(settings, camera, mounting, 0.0, &images[0].1, &readings).unwrap();
+        let mut errors = vec![];
+        for (timestamp, points) in images.iter().skip(every).step_by(every) {
+            if let Err(error) = estimation.add_keyframe(*timestamp, points, &flight.readings) {
+                errors.push(error.to_string());
+                let bad = [(1, Vector2::new(f64::NAN, 0.0))];
+                errors.push(estimation.add_keyframe(*timestamp, &bad, &readings).unwrap_err().to_string());
+                estimation.add_keyframe(*timestamp, points, &readings).unwrap();
             }
         }
-        let error = last.unwrap_err().to_string();
-        assert!(error.contains("no reading for 0.205 s after 1.995 s"), "{error}");
+        assert!(errors[0].contains("no reading for 0.205 s after 1.995 s"), "{}", errors[0]);
+        assert!(errors[1].contains("expected finite numbers"), "{}", errors[1]);
+        assert_eq!(estimation.causal_states(), whole.causal_states());
     }
 }

@@ -63,8 +63,8 @@ pub enum Stall {
     Domain,
     /// Several Gauss-Newton steps in a row raised the cost.
     Diverging,
-    /// The steps have led to where the cost does not depend on an unknown, although it did at the initial
-    /// values.
+    /// The steps have led to where the cost does not depend on a variable, although it did at the initial
+    /// values. Its factors still have a cost.
     RunOff,
 }
 

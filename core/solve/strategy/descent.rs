@@ -277,18 +277,26 @@ impl<'a> Descent<'a> {
     }
 
     /// Returns whether the slope of the cost along all unknowns of a variable has vanished on the way, although
-    /// the variable has factors. An example is the rate of an exponential function that has become so large
+    /// its factors still have a cost. An example is the rate of an exponential function that has become so large
     /// that its values are zero. The gradient is zero there, but it is no minimum. A single unknown may vanish
     /// at a minimum, such as the rotation of an ellipsoid that has become round.
     pub(crate) fn has_run_off(&self) -> bool {
         /// Remaining share of the diagonal entry of H below which a residual does not depend on the unknown.
         const MIN_SHARE: f64 = 1e-20;
-        let now: Vec<f64> = self.problem.system.diagonal().copied().collect();
-        let vanished = |i: usize| now[i] < MIN_SHARE * self.initial_diagonal[i];
-        self.problem.model.variables.iter().any(|variable| {
-            let mut unknowns = variable.unknowns().flatten().peekable();
-            unknowns.peek().is_some() && unknowns.all(vanished)
-        })
+        let model = &self.problem.model;
+        let entries = self.problem.system.diagonal().zip(&self.initial_diagonal);
+        let has_vanished: Vec<bool> = entries.map(|(now, initial)| *now < MIN_SHARE * initial).collect();
+        if !has_vanished.contains(&true) {
+            return false;
+        }
+        let mut costs = vec![];
+        model.factor_costs(&mut costs);
+        let is_lost = |variable: &u32| {
+            let mut unknowns = model.variables[*variable as usize].unknowns().flatten().peekable();
+            unknowns.peek().is_some() && unknowns.all(|unknown| has_vanished[unknown])
+        };
+        let costly = model.factors.iter().zip(costs).filter(|(_, cost)| *cost > 0.0);
+        costly.flat_map(|(factor, _)| factor.variables.iter()).any(is_lost)
     }
 
     fn largest_gradient(&self) -> f64 {

@@ -94,3 +94,17 @@ fn a_fit_without_a_minimum_has_run_off() {
         assert_eq!(*found, Termination::Stalled { reason: Stall::RunOff }, "{found}");
     }
 }
+
+/// The slope along b1 vanishes once its inequality holds, which is a minimum. The cost of b2 stays.
+#[test]
+fn an_inequality_that_comes_to_hold_is_converged() {
+    let residual = "where(x, where(1 - b1, 1 - b1, 0), b2 - y)";
+    for solver in
+        [&Auto::default() as &dyn Optimizer, &LevenbergMarquardt::default(), &GaussNewton::default()]
+    {
+        let solution = fit(residual, &[[1.0, 0.0], [0.0, 1.0], [0.0, 2.0]], &[0.0, 0.0], solver);
+        let found = &solution.outcome.termination;
+        assert!(found.is_converged(), "{found}");
+        assert!(solution.values.get::<Point1>("b1").unwrap().x >= 1.0 - 1e-9);
+    }
+}

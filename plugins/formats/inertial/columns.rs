@@ -1,4 +1,5 @@
 //! Columns of numbers in a CSV file, found by their names.
+use crate::detections::line;
 use crate::error::{Mistake, ProblemList};
 use csv::{ReaderBuilder, Trim};
 
@@ -12,15 +13,14 @@ pub(super) struct Column {
 /// Seconds above which a timestamp is in a smaller unit: the year 5138.
 const MAX_SECONDS: f64 = 1e11;
 
-/// Rows of numbers, one for each line that has them.
-pub(super) struct Columns<const N: usize> {
-    rows: Vec<(usize, [f64; N])>,
+/// Returns the text without the comment sign before its header.
+fn without_sign(text: &str) -> &str {
+    text.trim_start_matches(['\u{feff}', '#', ' '])
 }
 
-/// Returns the names in the first line, without a comment sign and units.
+/// Returns the names of the columns, without their units.
 pub(super) fn header(text: &str) -> impl Iterator<Item = &str> {
-    let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
-    first.trim_start_matches(['#', ' ', '\u{feff}']).split(',').map(plain)
+    without_sign(text).lines().next().unwrap_or_default().split(',').map(plain)
 }
 
 /// Returns the name of a column without its unit, such as `[ns]` or `(ns)`.
@@ -28,64 +28,52 @@ fn plain(name: &str) -> &str {
     name.split(['[', '(']).next().unwrap_or_default().trim()
 }
 
-impl<const N: usize> Columns<N> {
-    /// Reads the rows that have values in these columns, the first of which is a time. The mistakes go to
-    /// `problems`.
-    pub(super) fn read(text: &str, wanted: &[Column; N], problems: &mut ProblemList<'_>) -> Self {
-        let mut rows = vec![];
-        let names: Vec<&str> = header(text).collect();
-        let find = |column: &Column| {
-            names.iter().position(|name| *name == column.name || column.others.contains(name))
-        };
-        let places: Vec<Option<usize>> = wanted.iter().map(find).collect();
-        let missing = wanted.iter().zip(&places).filter(|(_, place)| place.is_none());
-        let missing: Vec<&str> = missing.map(|(column, _)| column.name).collect();
-        if !missing.is_empty() {
-            let all: Vec<&str> = wanted.iter().map(|column| column.name).collect();
-            let message = format!(
-                "the header has no column {}: expected {} and a header in the first line",
-                missing.join(", "),
-                all.join(", ")
-            );
-            problems.push(1, Mistake::Row(message));
-            return Self { rows };
-        }
-        let places: Vec<usize> = places.into_iter().flatten().collect();
-        let time = header_field(text, places.first().copied().unwrap_or(0));
-        let scale = if time.contains("ns") { 1e-9 } else { 1.0 };
-        let mut reader = ReaderBuilder::new().trim(Trim::All).flexible(true).from_reader(text.as_bytes());
-        for record in reader.records() {
-            let record = match record {
-                Ok(record) => record,
-                Err(error) => {
-                    let line = error.position().map_or(0, |position| position.line() as usize);
-                    problems.push(line, Mistake::Row(error.to_string()));
-                    continue;
-                }
-            };
-            let line = record.position().map_or(0, |position| position.line() as usize);
-            let fields: Vec<&str> =
-                places.iter().map(|place| record.get(*place).unwrap_or_default()).collect();
-            // the time alone may be that of another table's row
-            let is_comment = record.get(0).is_some_and(|first| first.starts_with('#'));
-            if is_comment || fields.iter().skip(1).all(|field| field.is_empty()) {
+/// Returns the rows that have values in these columns, the first of which is a time, with their lines. The
+/// mistakes go to `problems`.
+pub(super) fn rows<const N: usize>(
+    text: &str,
+    wanted: &[Column; N],
+    problems: &mut ProblemList<'_>,
+) -> Vec<(usize, [f64; N])> {
+    let text = without_sign(text);
+    let mut reader =
+        ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).flexible(true).from_reader(text.as_bytes());
+    let header = reader.headers().cloned().unwrap_or_default();
+    let find = |column: &Column| {
+        header.iter().position(|name| plain(name) == column.name || column.others.contains(&plain(name)))
+    };
+    let places: Vec<Option<usize>> = wanted.iter().map(find).collect();
+    let missing = wanted.iter().zip(&places).filter(|(_, place)| place.is_none());
+    let missing: Vec<&str> = missing.map(|(column, _)| column.name).collect();
+    if !missing.is_empty() {
+        let all = wanted.map(|column| column.name).join(", ");
+        let missing = missing.join(", ");
+        let message = format!("the header has no column {missing}: expected {all} in the first line");
+        problems.push(1, Mistake::Row(message));
+        return vec![];
+    }
+    let places: Vec<usize> = places.into_iter().flatten().collect();
+    let is_in_ns = places.first().and_then(|time| header.get(*time)).is_some_and(|time| time.contains("ns"));
+    let scale = if is_in_ns { 1e-9 } else { 1.0 };
+    let mut rows = vec![];
+    for record in reader.records() {
+        let record = match record {
+            Ok(record) => record,
+            Err(error) => {
+                let at = error.position().map_or(0, |position| line(text, position));
+                problems.push(at, Mistake::Row(error.to_string()));
                 continue;
             }
-            rows.extend(problems.ok(line, numbers(&fields, wanted, scale)).map(|numbers| (line, numbers)));
+        };
+        let fields: Vec<&str> = places.iter().map(|place| record.get(*place).unwrap_or_default()).collect();
+        // the time alone may belong to the row of another table
+        if fields.iter().skip(1).all(|field| field.is_empty()) {
+            continue;
         }
-        Self { rows }
+        let at = record.position().map_or(0, |position| line(text, position));
+        rows.extend(problems.ok(at, numbers(&fields, wanted, scale)).map(|numbers| (at, numbers)));
     }
-
-    /// Returns the rows, with their lines.
-    pub(super) fn rows(self) -> impl Iterator<Item = (usize, [f64; N])> {
-        self.rows.into_iter()
-    }
-}
-
-/// Returns a field of the header with its unit.
-fn header_field(text: &str, place: usize) -> &str {
-    let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
-    first.split(',').nth(place).unwrap_or_default()
+    rows
 }
 
 fn numbers<const N: usize>(fields: &[&str], wanted: &[Column; N], scale: f64) -> Result<[f64; N], Mistake> {

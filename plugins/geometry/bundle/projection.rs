@@ -22,7 +22,8 @@ pub struct Projection<M = Camera> {
 fn description<M: CameraModel + ProjectionName>() -> String {
     format!(
         "The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.\n\nVariables: the pose of the camera, from its own frame (z \
-         forward) to the world's, and the point. With `body_from_camera`, the pose is that of a body on which the camera is mounted. π is the projection of `camera`. Rows: x to the right and y down. Not defined if \
+         forward) to the world's, and the point. With `body_from_camera`, the pose is that of a body on which the camera is \
+         mounted. π is the projection of `camera`. Rows: x to the right and y down. Not defined if \
          the camera cannot see the point, for example behind it; the factor is inactive there.\n\n```toml\n[[factors]]\nkeys = \
          [\"x0\", \"l0\"]\nfactor = {{ type = \"{}\", pixel = [310.0, 262.5], camera = {} }}\nnoise = {{ sigma = 1.0 }}\n```",
         M::PROJECTION,

@@ -48,3 +48,39 @@ pub trait LieGroup: Manifold {
         product
     }
 }
+
+/// Implements [`LieGroup`] for a newtype of a vector, with addition as the group operation.
+macro_rules! additive_group {
+    ($type:ty, $n:literal, $name:literal, $example:literal) => {
+        impl $crate::groups::LieGroup for $type {
+            const NAME: &'static str = $name;
+            const EXAMPLE: &'static str = $example;
+
+            fn identity() -> Self {
+                Self(nalgebra::SVector::zeros())
+            }
+            fn compose(x: &Self, y: &Self) -> Self {
+                Self(x.0 + y.0)
+            }
+            fn inverse(x: &Self) -> Self {
+                Self(-x.0)
+            }
+            fn between<T: manifactor_graph::Scalar>(
+                x: &nalgebra::SVector<T, $n>,
+                y: &nalgebra::SVector<T, $n>,
+            ) -> nalgebra::SVector<T, $n> {
+                y - x
+            }
+            fn log<T: manifactor_graph::Scalar>(x: &nalgebra::SVector<T, $n>) -> nalgebra::SVector<T, $n> {
+                *x
+            }
+            fn inverse_right_jacobian(_: &nalgebra::SVector<f64, $n>) -> nalgebra::SMatrix<f64, $n, $n> {
+                nalgebra::SMatrix::identity()
+            }
+            fn adjoint_of_inverse(_: &nalgebra::SVector<f64, $n>) -> nalgebra::SMatrix<f64, $n, $n> {
+                nalgebra::SMatrix::identity()
+            }
+        }
+    };
+}
+pub(crate) use additive_group;

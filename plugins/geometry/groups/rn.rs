@@ -1,8 +1,8 @@
 //! Points: Rⁿ, with x ⊞ δ = x + δ.
 use crate::groups::Coordinates;
-use crate::groups::LieGroup;
+use crate::groups::lie_group::additive_group;
 use manifactor_graph::{Dimension, JetOf, Lift, Manifold, Scalar, register_manifold};
-use nalgebra::{Const, SMatrix, SVector};
+use nalgebra::{Const, SVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::Deref;
@@ -108,31 +108,7 @@ impl<const N: usize> Manifold for Rn<N> {
 
 macro_rules! point {
     ($n:literal, $name:literal, $example:literal) => {
-        impl LieGroup for Rn<$n> {
-            const NAME: &'static str = $name;
-            const EXAMPLE: &'static str = $example;
-            fn identity() -> Self {
-                Rn(SVector::zeros())
-            }
-            fn compose(x: &Self, y: &Self) -> Self {
-                Rn(x.0 + y.0)
-            }
-            fn inverse(x: &Self) -> Self {
-                Rn(-x.0)
-            }
-            fn between<T: Scalar>(x: &SVector<T, $n>, y: &SVector<T, $n>) -> SVector<T, $n> {
-                y - x
-            }
-            fn log<T: Scalar>(x: &SVector<T, $n>) -> SVector<T, $n> {
-                *x
-            }
-            fn inverse_right_jacobian(_: &SVector<f64, $n>) -> SMatrix<f64, $n, $n> {
-                SMatrix::identity()
-            }
-            fn adjoint_of_inverse(_: &SVector<f64, $n>) -> SMatrix<f64, $n, $n> {
-                SMatrix::identity()
-            }
-        }
+        additive_group!(Rn<$n>, $n, $name, $example);
         register_manifold!($name, Rn<$n>);
     };
 }

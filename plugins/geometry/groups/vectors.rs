@@ -1,7 +1,8 @@
 //! Vectors with named parts, such as velocities: Rⁿ, with x ⊞ δ = x + δ.
-use crate::groups::{Coordinates, LieGroup};
+use crate::groups::Coordinates;
+use crate::groups::lie_group::additive_group;
 use manifactor_graph::{Dimension, JetOf, Lift, Manifold, Scalar, register_manifold};
-use nalgebra::{SMatrix, SVector, U3, U6, Vector3};
+use nalgebra::{SVector, U3, U6, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::Deref;
@@ -86,33 +87,7 @@ macro_rules! vector {
             }
         }
 
-        impl LieGroup for $name {
-            const NAME: &'static str = $registered;
-            const EXAMPLE: &'static str = $example;
-
-            fn identity() -> Self {
-                Self::zero()
-            }
-            fn compose(x: &Self, y: &Self) -> Self {
-                Self(x.0 + y.0)
-            }
-            fn inverse(x: &Self) -> Self {
-                Self(-x.0)
-            }
-            fn between<T: Scalar>(x: &SVector<T, $n>, y: &SVector<T, $n>) -> SVector<T, $n> {
-                y - x
-            }
-            fn log<T: Scalar>(x: &SVector<T, $n>) -> SVector<T, $n> {
-                *x
-            }
-            fn inverse_right_jacobian(_: &SVector<f64, $n>) -> SMatrix<f64, $n, $n> {
-                SMatrix::identity()
-            }
-            fn adjoint_of_inverse(_: &SVector<f64, $n>) -> SMatrix<f64, $n, $n> {
-                SMatrix::identity()
-            }
-        }
-
+        additive_group!($name, $n, $registered, $example);
         register_manifold!($registered, $name);
     };
 }

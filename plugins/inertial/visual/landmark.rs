@@ -1,7 +1,6 @@
 //! Landmarks from tracks of points.
 use manifactor_geometry::{Camera, CameraModel, Se3};
 use nalgebra::{Matrix3, Vector2, Vector3};
-use std::collections::BTreeMap;
 
 /// Minimum number of keyframes that see a landmark.
 const MIN_POINTS: usize = 3;
@@ -24,10 +23,6 @@ impl Track {
     pub(super) fn push(&mut self, keyframe: usize, pixel: Vector2<f64>) {
         self.points.push((keyframe, pixel));
     }
-    /// Returns the last keyframe.
-    pub(super) fn last(&self) -> Option<usize> {
-        self.points.last().map(|(keyframe, _)| *keyframe)
-    }
     /// Returns the pixel in a keyframe, if that is the last one.
     pub(super) fn pixel_in(&self, keyframe: usize) -> Option<Vector2<f64>> {
         self.points.last().filter(|point| point.0 == keyframe).map(|point| point.1)
@@ -39,42 +34,36 @@ impl Track {
 }
 
 /// Returns the point that is closest to all rays. `None` if there are too few rays, if they are almost parallel,
-/// or if the point does not fit them.
+/// or if the point does not fit them. `views` are poses of the camera, with the pixels there.
 pub(super) fn triangulate(
-    points: &[(usize, Vector2<f64>)],
-    poses: &BTreeMap<usize, Se3>,
+    views: &[(Se3, Vector2<f64>)],
     camera: &Camera,
     sigma: f64,
 ) -> Option<Vector3<f64>> {
-    if points.len() < MIN_POINTS {
+    if views.len() < MIN_POINTS {
         return None;
     }
-    let rays: Vec<_> = points
-        .iter()
-        .filter_map(|(keyframe, pixel)| {
-            let pose = poses.get(keyframe)?;
-            Some((pose, pixel, pose.rotation.act(&camera.ray(*pixel)).normalize()))
-        })
-        .collect();
+    let ray = |(pose, pixel): &(Se3, Vector2<f64>)| pose.rotation.act(&camera.ray(*pixel)).normalize();
+    let rays: Vec<Vector3<f64>> = views.iter().map(ray).collect();
     let (first, last) = (rays.first()?, rays.last()?);
-    let parallax = rays.iter().map(|ray| ray.2.cross(&first.2).norm().max(ray.2.cross(&last.2).norm()));
+    let parallax = rays.iter().map(|ray| ray.cross(first).norm().max(ray.cross(last).norm()));
     if parallax.fold(0.0, f64::max) < MIN_PARALLAX {
         return None;
     }
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for (pose, _, ray) in &rays {
+    for ((pose, _), ray) in views.iter().zip(&rays) {
         let across = Matrix3::identity() - ray * ray.transpose();
         normal += across;
         right += across * pose.translation;
     }
     let point = normal.cholesky()?.solve(&right);
     let mut errors = vec![];
-    for (pose, pixel, _) in &rays {
+    for (pose, pixel) in views {
         let seen = pose.inverse_act(&point);
         if !camera.sees(&seen) {
             return None;
         }
-        errors.push((camera.project(&seen) - **pixel).norm());
+        errors.push((camera.project(&seen) - pixel).norm());
     }
     errors.sort_by(f64::total_cmp);
     (errors[errors.len() / 2] <= MAX_ERROR * sigma).then_some(point)
@@ -92,13 +81,12 @@ mod tests {
         let pose = |k: usize| {
             Se3::new(So3::exp(&Vector3::new(0.0, 0.01 * k as f64, 0.0)), Vector3::x() * (0.1 * k as f64))
         };
-        let poses: BTreeMap<usize, Se3> = (0..5).map(|k| (k, pose(k))).collect();
-        let pixel = |k: usize| (k, camera.project(&poses[&k].inverse_act(&point)));
-        let points: Vec<_> = (0..5).map(pixel).collect();
-        let found = triangulate(&points, &poses, &camera, 1.0).unwrap();
+        let view = |pose: Se3| (pose, camera.project(&pose.inverse_act(&point)));
+        let views: Vec<_> = (0..5).map(|k| view(pose(k))).collect();
+        let found = triangulate(&views, &camera, 1.0).unwrap();
         assert!((found - point).norm() < 1e-9);
-        assert_eq!(triangulate(&points[..2], &poses, &camera, 1.0), None, "too few");
-        let still: BTreeMap<usize, Se3> = (0..5).map(|k| (k, pose(0))).collect();
-        assert_eq!(triangulate(&points, &still, &camera, 1.0), None, "parallel rays");
+        assert_eq!(triangulate(&views[..2], &camera, 1.0), None, "too few");
+        let still: Vec<_> = (0..5).map(|_| view(pose(0))).collect();
+        assert_eq!(triangulate(&still, &camera, 1.0), None, "parallel rays");
     }
 }

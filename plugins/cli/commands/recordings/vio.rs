@@ -14,9 +14,8 @@ use manifactor::formats::tum::{self, StampedPose};
 use manifactor::geometry::{Camera, CameraModel};
 use manifactor::inertial::ImuReading;
 use manifactor::inertial::visual::{
-    InertialState, VisualInertial, VisualInertialDocument, VisualInertialEstimate,
+    InertialState, TrackedPoint, VisualInertial, VisualInertialDocument, VisualInertialEstimate,
 };
-use manifactor::nalgebra::Vector2;
 use manifactor::slam::metrics::{Alignment, MetricsError, absolute_error, align, associate};
 use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::solve::{AllObservers, Interrupt, Observer};
@@ -49,7 +48,7 @@ pub(crate) struct Vio {
 }
 
 /// An image: its time and its tracked points.
-type Image = (f64, Vec<(u64, Vector2<f64>)>);
+type Image = (f64, Vec<TrackedPoint>);
 
 impl Vio {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
@@ -65,9 +64,7 @@ impl Vio {
         let keyframes = keyframes(&tracks, &document.camera, document.settings.every.get());
         let mut interrupt = interrupt::on_ctrl_c();
         let clock = Instant::now();
-        let Some(estimation) = estimate(&document, &keyframes, &readings, verbose, &mut interrupt)? else {
-            return Ok(Status::Interrupted);
-        };
+        let estimation = estimate(&document, &keyframes, &readings, verbose, &mut interrupt)?;
         let seconds = clock.elapsed().as_secs_f64();
         let mut watch = Watch::new(verbose, "solving");
         let mut observer = AllObservers(vec![&mut watch, &mut interrupt]);
@@ -142,14 +139,14 @@ fn keyframes(tracks: &Tracks, camera: &Camera, every: usize) -> Vec<Image> {
     images.into_iter().step_by(every).collect()
 }
 
-/// Adds all keyframes to the smoother. `None` after an interrupt.
+/// Adds keyframes to the smoother, all or until an interrupt.
 fn estimate(
     document: &VisualInertialDocument,
     keyframes: &[Image],
     readings: &[ImuReading],
     verbose: u8,
     interrupt: &mut Interrupt,
-) -> Result<Option<VisualInertial>, Failure> {
+) -> Result<VisualInertial, Failure> {
     let VisualInertialDocument { settings, camera, body_from_camera, .. } = document;
     // the first image with readings before it
     let begins = readings.first().map_or(f64::INFINITY, |reading| reading.timestamp);
@@ -160,18 +157,18 @@ fn estimate(
             "check that both files use the same clock, and the same unit of time",
         ));
     };
-    let begun = VisualInertial::begin(settings.clone(), *camera, *body_from_camera, *timestamp, readings);
-    let mut estimation = begun.map_err(Failure::input)?;
-    estimation.see(points.iter().copied());
+    let (settings, camera, mounting) = (settings.clone(), *camera, *body_from_camera);
+    let mut estimation = VisualInertial::begin(settings, camera, mounting, *timestamp, points, readings)
+        .map_err(Failure::input)?;
     let mut watch = Watch::new(verbose, "keyframes");
     for (timestamp, points) in keyframes {
-        watch.show(&format!("{timestamp:.2} s"));
-        estimation.add_keyframe(*timestamp, points.iter().copied(), readings).map_err(Failure::input)?;
         if interrupt.poll().is_break() {
-            return Ok(None);
+            break;
         }
+        watch.show(&format!("{timestamp:.2} s"));
+        estimation.add_keyframe(*timestamp, points, readings).map_err(Failure::input)?;
     }
-    Ok(Some(estimation))
+    Ok(estimation)
 }
 
 fn trajectory(states: &[InertialState]) -> Vec<StampedPose> {
