@@ -98,11 +98,18 @@ fn a_fit_without_a_minimum_has_run_off() {
 /// The slope along b1 vanishes once its inequality holds, which is a minimum. The cost of b2 stays.
 #[test]
 fn an_inequality_that_comes_to_hold_is_converged() {
-    let residual = "where(x, where(1 - b1, 1 - b1, 0), b2 - y)";
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    let factor = |name: &str, residual: &str| Expression::new([(name, "point1")], [residual]).unwrap();
+    graph.add(["b1"], factor("b1", "where(1 - b1, 1 - b1, 0)"));
+    graph.add(["b2"], factor("b2", "b2 - 1"));
+    graph.add(["b2"], factor("b2", "b2 - 2"));
+    for name in ["b1", "b2"] {
+        values.insert(name, Point1::new(Vector1::new(0.0)));
+    }
     for solver in
         [&Auto::default() as &dyn Optimizer, &LevenbergMarquardt::default(), &GaussNewton::default()]
     {
-        let solution = fit(residual, &[[1.0, 0.0], [0.0, 1.0], [0.0, 2.0]], &[0.0, 0.0], solver);
+        let solution = solve(&graph, &values, solver, &mut Silent).unwrap();
         let found = &solution.outcome.termination;
         assert!(found.is_converged(), "{found}");
         assert!(solution.values.get::<Point1>("b1").unwrap().x >= 1.0 - 1e-9);
