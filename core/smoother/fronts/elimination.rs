@@ -6,10 +6,13 @@ use crate::model::{Blocks, Overflow};
 use manifactor_solve::front::eliminate;
 use pulp::{Simd, WithSimd};
 
-/// A pivot below this share of the diagonal entry of H is rounding error, so no factor constrains the
-/// direction. It is held at its linearization point. Batch solvers do not move such a direction either,
-/// because it has no gradient.
-const MIN_PIVOT_SHARE: f64 = 1e-14;
+/// Rounding error of a diagonal entry of H, as a share of it. If a pivot is smaller than its rounding error, no
+/// factor constrains the direction. It is held at its linearization point. Batch solvers do not move such a
+/// direction either, because it has no gradient.
+const ROUNDING_SHARE: f64 = 1e-14;
+/// A pivot above this share of the diagonal entry of H is not rounding error.
+const CLEAR_PIVOT_SHARE: f64 = 1e-9;
+
 /// Assembly and elimination of new fronts.
 pub(super) struct Build<'a> {
     pub(super) fronts: &'a mut Fronts,
@@ -101,14 +104,32 @@ fn first_unconstrained(blocks: &Blocks, front: &Front, panel: &[f64], held: &[us
     let mut column = 0;
     for v in &front.blocks {
         for precision in blocks.precision(*v) {
-            let pivot = panel[column * (height + 1)];
-            if pivot * pivot < MIN_PIVOT_SHARE * precision * precision && !held.contains(&column) {
+            let (pivot, entry) = (panel[column * (height + 1)], precision * precision);
+            if pivot * pivot < CLEAR_PIVOT_SHARE * entry
+                && !held.contains(&column)
+                && pivot * pivot < rounding_error(blocks, front, panel, column)
+            {
                 return Some(column);
             }
             column += 1;
         }
     }
     None
+}
+
+/// Returns the rounding error of the square of a pivot: that of its diagonal entry, and those of the earlier
+/// pivots of the front, which grow by ℓ²ᵢⱼ/ℓ²ⱼⱼ as column j is subtracted.
+#[cold]
+fn rounding_error(blocks: &Blocks, front: &Front, panel: &[f64], column: usize) -> f64 {
+    let height = front.width + front.below + 1;
+    let entries = front.blocks.iter().flat_map(|v| blocks.precision(*v)).map(|precision| precision * precision);
+    let mut errors: Vec<f64> = vec![];
+    for (i, entry) in entries.take(column + 1).enumerate() {
+        let growth = |j: usize| panel[j * height + i] / panel[j * (height + 1)];
+        let earlier: f64 = errors.iter().enumerate().map(|(j, error)| growth(j).powi(2) * error).sum();
+        errors.push(ROUNDING_SHARE * entry + earlier);
+    }
+    errors.last().copied().unwrap_or(0.0)
 }
 
 /// Fills a panel with the terms of the factors, and stores the first row of each variable.

@@ -87,6 +87,30 @@ fn what_is_tied_to_itself_alone_is_undetermined_and_named() {
 }
 
 #[test]
+fn two_points_that_turn_about_a_third_are_named_at_every_angle() {
+    let update = |angle: f64, sigma: Option<f64>| {
+        let mut smoother = smoother(&["a"]);
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        let at = |distance: f64| Plane { x: 0.1 + distance * angle.cos(), y: distance * angle.sin() };
+        values.insert("p", Plane { x: 1.0, ..at(2.0) });
+        values.insert("q", at(2.0));
+        graph.add(["p", "q"], crate::toy::Apart { by: [0.7, 1.0] });
+        graph.add(["p", "q"], Distance { by: 1.0 });
+        graph.add(["a", "q"], Distance { by: 2.0 });
+        if let Some(sigma) = sigma {
+            graph.add(["p"], At { at: [1.0, 1.0] }).noise(Noise::sigma(sigma).unwrap());
+        }
+        smoother.push(&graph, &values).unwrap();
+        smoother.update().unwrap().undetermined_directions.len()
+    };
+    for i in 0..360 {
+        let angle = f64::from(i).to_radians() + 1e-3;
+        assert_eq!(update(angle, None), 1, "{i}°");
+        assert_eq!(update(angle, Some(1e4)), 0, "{i}°");
+    }
+}
+
+#[test]
 fn a_factor_that_is_not_defined_leaves_what_hangs_on_it_alone_undetermined() {
     let mut smoother = smoother(&["a"]);
     let (mut graph, mut values) = (Graph::new(), Values::new());
