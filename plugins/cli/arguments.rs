@@ -1,7 +1,7 @@
 //! The command line.
 use crate::commands::{
-    Check, CheckFactor, CheckManifold, Completions, Evaluate, Experiment, Explain, Inspect, Learn, List, Man,
-    New, Online, Plot, Replay, Run, Schema, ShowGraph, Simulate, Solve, Vio,
+    Check, CheckFactor, CheckManifold, Completions, Doctor, Evaluate, Experiment, Explain, Inspect, Learn,
+    List, Man, New, Online, Plot, Replay, Run, Schema, ShowGraph, Simulate, Solve, Vio,
 };
 use crate::failure::Failure;
 use crate::output::text::count;
@@ -48,6 +48,7 @@ enum Command {
     Solve(Solve),
     Replay(Replay),
     Vio(Vio),
+    Doctor(Doctor),
     Check(Check),
     CheckFactor(CheckFactor),
     CheckManifold(CheckManifold),
@@ -88,6 +89,7 @@ impl Cli {
             Command::Solve(command) => command.run(self.verbose),
             Command::Replay(command) => command.run(),
             Command::Vio(command) => command.run(self.verbose),
+            Command::Doctor(command) => command.run(),
             Command::Check(command) => command.run(),
             Command::CheckFactor(command) => command.run(),
             Command::CheckManifold(command) => command.run(),
@@ -136,6 +138,7 @@ impl Cli {
             Command::Solve(command) => command.json,
             Command::Replay(command) => command.json,
             Command::Vio(command) => command.json,
+            Command::Doctor(command) => command.json,
             Command::Check(command) => command.json,
             Command::CheckFactor(command) => command.json,
             Command::CheckManifold(command) => command.json,

@@ -24,7 +24,7 @@ pub(crate) use learn::Learn;
 pub(crate) use new::New;
 pub(crate) use online::Online;
 pub(crate) use plot::Plot;
-pub(crate) use recordings::{Inspect, Simulate, Vio};
+pub(crate) use recordings::{Doctor, Inspect, Simulate, Vio};
 pub(crate) use replay::Replay;
 pub(crate) use run::Run;
 pub(crate) use solve::Solve;

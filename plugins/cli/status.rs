@@ -19,6 +19,8 @@ pub enum Status {
     DetectionsLeftOut,
     /// A factor or a type of variables breaks a law: exit code 1.
     Broken,
+    /// A recording has a probable fault: exit code 1.
+    FaultsFound,
     /// Everything is written except for a journal that lacks frames: exit code 3.
     JournalIncomplete,
     /// Ctrl-C ended the command early; the best values so far are written: exit code 130.
@@ -59,7 +61,11 @@ impl From<Status> for u8 {
     fn from(status: Status) -> u8 {
         match status {
             Status::Done => 0,
-            Status::NotConverged | Status::NothingMapped | Status::DetectionsLeftOut | Status::Broken => 1,
+            Status::NotConverged
+            | Status::NothingMapped
+            | Status::DetectionsLeftOut
+            | Status::FaultsFound
+            | Status::Broken => 1,
             Status::JournalIncomplete => 3,
             Status::Interrupted => 130,
         }

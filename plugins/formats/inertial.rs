@@ -36,7 +36,18 @@ const FORCES: [f64; 2] = [3.0, 30.0];
 /// # Errors
 /// If a column is missing, a row is malformed, timestamps do not increase, or the units are implausible.
 pub fn read_imu(path: impl AsRef<Path>) -> Result<Vec<ImuReading>, FormatError> {
-    let path = path.as_ref();
+    read_readings(path.as_ref(), true)
+}
+
+/// Reads the samples of an IMU like [`read_imu`], in any unit.
+///
+/// # Errors
+/// If a column is missing, a row is malformed, or timestamps do not increase.
+pub fn read_imu_in_any_unit(path: impl AsRef<Path>) -> Result<Vec<ImuReading>, FormatError> {
+    read_readings(path.as_ref(), false)
+}
+
+fn read_readings(path: &Path, has_units: bool) -> Result<Vec<ImuReading>, FormatError> {
     let text = read_text(path)?;
     let mut problems = ProblemList::of(path, &text);
     let mut rows: Vec<ImuReading> = vec![];
@@ -49,7 +60,7 @@ pub fn read_imu(path: impl AsRef<Path>) -> Result<Vec<ImuReading>, FormatError> 
         let rate = row.gyroscope.norm();
         if let Some(previous) = rows.last().map(|row| row.timestamp).filter(|before| timestamp <= *before) {
             problems.push(line, Mistake::NotIncreasing { previous, found: timestamp });
-        } else if rate > MAX_RATE {
+        } else if has_units && rate > MAX_RATE {
             let message = format!("a rate of {rate:.1} rad/s is implausible: convert degrees to radians");
             problems.push(line, Mistake::Row(message));
         } else {
@@ -58,7 +69,7 @@ pub fn read_imu(path: impl AsRef<Path>) -> Result<Vec<ImuReading>, FormatError> 
     }
     let mut forces: Vec<f64> = rows.iter().map(|row| row.accelerometer.norm()).collect();
     forces.sort_by(f64::total_cmp);
-    let median = forces.get(forces.len() / 2).copied();
+    let median = forces.get(forces.len() / 2).copied().filter(|_| has_units);
     if let Some(median) = median.filter(|force| !(FORCES[0]..FORCES[1]).contains(force)) {
         let remedy = if (0.8..1.2).contains(&median) {
             "it looks like units of g: multiply by 9.81"

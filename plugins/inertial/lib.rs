@@ -4,6 +4,7 @@
 //! turns these samples into one relative motion, with its covariance and its derivative with respect to the
 //! biases. [`Imu`] is the factor of this motion. Its variables are pose, velocity and bias at both ends, so
 //! every other factor on poses works beside it.
+pub mod diagnosis;
 mod imu;
 mod preintegration;
 mod samples;

@@ -35,7 +35,9 @@ fn pose(time: f64) -> Se3 {
     let phase = moving - (1.0 - (-moving.powi(3)).exp()) * 0.5;
     let angle = std::f64::consts::TAU * phase / 6.0 * (1.0 - (-moving.powi(3)).exp());
     let translation = Vector3::new(angle.sin(), 1.0 - angle.cos(), 0.4 * (2.0 * angle).sin());
-    Se3::new(So3::exp(&(Vector3::new(0.2, 0.3, 0.5) * angle.sin())), translation)
+    let turn = So3::exp(&(Vector3::new(0.2, 0.3, 0.5) * angle.sin()));
+    // about a second axis too, so that the rotation of the camera is determined
+    Se3::new(turn.compose(&So3::exp(&(Vector3::new(0.3, -0.2, 0.0) * (2.0 * angle).sin()))), translation)
 }
 
 /// Returns a number between -1 and 1 that depends on `seed` as if it were random.

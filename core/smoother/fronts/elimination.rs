@@ -122,7 +122,8 @@ fn first_unconstrained(blocks: &Blocks, front: &Front, panel: &[f64], held: &[us
 #[cold]
 fn rounding_error(blocks: &Blocks, front: &Front, panel: &[f64], column: usize) -> f64 {
     let height = front.width + front.below + 1;
-    let entries = front.blocks.iter().flat_map(|v| blocks.precision(*v)).map(|precision| precision * precision);
+    let entries =
+        front.blocks.iter().flat_map(|v| blocks.precision(*v)).map(|precision| precision * precision);
     let mut errors: Vec<f64> = vec![];
     for (i, entry) in entries.take(column + 1).enumerate() {
         let growth = |j: usize| panel[j * height + i] / panel[j * (height + 1)];

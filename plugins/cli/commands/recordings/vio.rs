@@ -8,13 +8,14 @@ use crate::output::text::count;
 use crate::output::watch::Watch;
 use crate::status::Status;
 use clap::Args;
-use manifactor::config::{Document, Errors};
+use manifactor::config::Errors;
 use manifactor::formats::inertial::{Tracks, read_imu, read_states, read_tracks};
 use manifactor::formats::tum::{self, StampedPose};
 use manifactor::geometry::{Camera, CameraModel};
 use manifactor::inertial::ImuReading;
+use manifactor::inertial::diagnosis::Image;
 use manifactor::inertial::visual::{
-    InertialState, TrackedPoint, VisualInertial, VisualInertialDocument, VisualInertialEstimate,
+    InertialState, VisualInertial, VisualInertialDocument, VisualInertialEstimate,
 };
 use manifactor::slam::metrics::{Alignment, MetricsError, absolute_error, align, associate};
 use manifactor::slam::output::{OutputFolder, write_whole};
@@ -47,21 +48,17 @@ pub(crate) struct Vio {
     pub(crate) json: bool,
 }
 
-/// An image: its time and its tracked points.
-type Image = (f64, Vec<TrackedPoint>);
-
 impl Vio {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
-        let mut document = document::open(&self.config, kind::VIO)?;
-        document.set(&self.set)?;
-        let document = read(&document)?;
+        let document = read(&self.config, &self.set)?;
         let folder = self.config.parent().unwrap_or(Path::new("."));
         let readings = read_imu(folder.join(&document.imu))?;
         let tracks = read_tracks(folder.join(&document.tracks))?;
         let truth = document.ground_truth.as_ref().map(|path| read_truth(&folder.join(path))).transpose()?;
         let out = self.out.as_ref().unwrap_or(&document.output);
         let _claimed = OutputFolder::claim(out, "vio", &self.config, self.force)?;
-        let keyframes = keyframes(&tracks, &document.camera, document.settings.every.get());
+        let every = document.settings.every.get();
+        let keyframes: Vec<Image> = images(&tracks, &document.camera).into_iter().step_by(every).collect();
         let mut interrupt = interrupt::on_ctrl_c();
         let clock = Instant::now();
         let estimation = estimate(&document, &keyframes, &readings, verbose, &mut interrupt)?;
@@ -111,7 +108,10 @@ impl Vio {
     }
 }
 
-fn read(document: &Document) -> Result<VisualInertialDocument, Failure> {
+/// Reads a document, with values that replace its own.
+pub(super) fn read(path: &Path, set: &[String]) -> Result<VisualInertialDocument, Failure> {
+    let mut document = document::open(path, kind::VIO)?;
+    document.set(set)?;
     let errors = Errors::new();
     let read = document.section(&errors).and_then(|section| section.rest());
     Ok(errors.finish(read)?)
@@ -123,8 +123,8 @@ fn read_truth(path: &Path) -> Result<Vec<StampedPose>, Failure> {
     Ok(if is_csv { read_states(path)? } else { tum::read(path)?.poses })
 }
 
-/// Returns every n-th image, with pixels.
-fn keyframes(tracks: &Tracks, camera: &Camera, every: usize) -> Vec<Image> {
+/// Returns all images, with pixels.
+pub(super) fn images(tracks: &Tracks, camera: &Camera) -> Vec<Image> {
     let mut images: Vec<Image> = vec![];
     for row in &tracks.rows {
         let pixel = match tracks.is_normalized {
@@ -136,7 +136,7 @@ fn keyframes(tracks: &Tracks, camera: &Camera, every: usize) -> Vec<Image> {
             None => images.push((row.timestamp, vec![(row.landmark, pixel)])),
         }
     }
-    images.into_iter().step_by(every).collect()
+    images
 }
 
 /// Adds keyframes to the smoother, all or until an interrupt.

@@ -1,0 +1,361 @@
+//! Diagnosis of a visual-inertial recording: which number of its calibration, or which unit, is probably wrong.
+//!
+//! Each [`Fault`] has a correction of the recording. The diagnosis compares the likelihood of the recording as it
+//! is with that of each corrected recording, takes the fault with the largest gain, and repeats this until no
+//! correction gains anything. Residuals are the distances of tracked points from their epipolar planes, given the rotation
+//! that the gyroscope measured, and the deviations of the specific force from one constant gravity.
+mod clocks;
+mod faults;
+mod gravity;
+mod rotation;
+
+pub use faults::{Axes, Fault, Sensor};
+
+use crate::samples::ImuReading;
+use gravity::GravityFit;
+use manifactor_geometry::{Camera, Se3};
+use nalgebra::{Vector2, Vector3};
+use rotation::RotationFit;
+use serde::Serialize;
+
+/// An image: its time in seconds, and the pixels of numbered points.
+pub type Image = (f64, Vec<(u64, Vector2<f64>)>);
+
+/// Smallest gain of a fault, in units of the natural logarithm, and as a share of the cost.
+const MIN_GAIN: f64 = 40.0;
+const MIN_SHARE: f64 = 0.05;
+/// Smallest gain by points that come before the camera, as a share of the cost of those behind it.
+const MIN_BEHIND: f64 = 0.25;
+/// Minimum number of pairs of images.
+const MIN_PAIRS: usize = 10;
+/// Faults are first judged with every third pair of images, and the best ones again with all.
+const STRIDE: usize = 3;
+const BEST: usize = 6;
+/// A simpler fault is preferred if it has this share of the largest gain.
+const SIMPLER: f64 = 0.9;
+/// A fault is an alternative if its gain is less than the largest one by at most this share, and this number.
+const ALTERNATIVE: [f64; 2] = [0.05, 300.0];
+/// Differences that are too small to be a fault: seconds, factor minus one, distortion, radians.
+const MIN_OFFSET: f64 = 4e-3;
+const MIN_FACTOR: f64 = 0.04;
+const MIN_DISTORTION: f64 = 0.03;
+const MIN_TURN: f64 = 0.03;
+/// Plausible lengths of gravity, in m/s². That of the Moon is 1.6 m/s².
+const GRAVITIES: [f64; 2] = [0.3, 30.0];
+/// Largest number of faults of one recording.
+const MAX_FAULTS: usize = 4;
+
+/// A visual-inertial recording with its calibration.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    readings: Vec<ImuReading>,
+    images: Vec<Image>,
+    camera: Camera,
+    body_from_camera: Se3,
+    gravity: f64,
+    /// Radial distortion that is still in the pixels: 1 + k r².
+    distortion: f64,
+    /// Whether gravity was subtracted from the specific force.
+    has_no_gravity: bool,
+}
+
+/// A fault that was found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// The fault.
+    #[serde(flatten)]
+    pub fault: Fault,
+    /// Increase of the logarithm of the likelihood by the correction. `None` if there is no likelihood without it.
+    pub gain: Option<f64>,
+    /// Faults that explain the recording about as well.
+    pub alternatives: Vec<Fault>,
+    /// The evidence: what was measured without and with the correction.
+    pub evidence: String,
+}
+
+/// The result of a diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// Probable faults, the most probable first. Each is judged with the earlier ones corrected.
+    pub findings: Vec<Finding>,
+    /// Number of pairs of images that were compared.
+    pub pairs: usize,
+    /// Number of points in all pairs.
+    pub points: usize,
+    /// Median distance of points from their epipolar lines, in pixels, with all corrections.
+    pub residual: f64,
+    /// Length of gravity, in m/s², with all corrections.
+    pub gravity: f64,
+    /// Bias of the gyroscope, in rad/s, with all corrections.
+    pub gyroscope_bias: [f64; 3],
+}
+
+/// The reason why a recording cannot be diagnosed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DiagnosisError {
+    /// There are too few points to compare with the gyroscope.
+    #[error(
+        "expected at least {MIN_PAIRS} pairs of images with {} points in both and readings of the IMU between them, got {found}: \
+         give a longer part of the recording",
+        rotation::MIN_POINTS
+    )]
+    FewPairs {
+        /// Number of such pairs.
+        found: usize,
+    },
+}
+
+/// The likelihood of a recording.
+#[derive(Debug, Clone)]
+struct Fit {
+    rotation: RotationFit,
+    gravity: GravityFit,
+}
+
+/// A fault with its gain, and the fit of the corrected recording.
+#[derive(Debug, Clone)]
+struct Judged {
+    gain: f64,
+    fault: Fault,
+    fit: Fit,
+}
+
+impl Fit {
+    /// Fits every `stride`-th pair of images.
+    fn new(recording: &Recording, stride: usize) -> Self {
+        let rotation = rotation::fit(recording, &rotation::pairs(recording, stride), false);
+        let gravity = gravity::fit(recording, &rotation.bias);
+        Self { rotation, gravity }
+    }
+
+    /// Returns the gain from this fit to that of a corrected recording.
+    fn gain(&self, fault: &Fault, corrected: &Self) -> f64 {
+        // corrections of times change which pairs have readings
+        let points = self.rotation.points.min(corrected.rotation.points) as f64;
+        let mean = |fit: &Self| fit.rotation.cost / fit.rotation.points.max(1) as f64;
+        let of_rotation = points * (mean(self) - mean(corrected));
+        // the density of readings in a different unit
+        let density = match fault {
+            Fault::AccelerometerUnit { factor } => 3.0 * self.gravity.windows as f64 * factor.ln(),
+            _ => 0.0,
+        };
+        of_rotation + self.gravity.cost - corrected.gravity.cost + density
+    }
+
+    fn evidence(&self, fault: &Fault, corrected: &Self) -> String {
+        match fault.keeps_rotation() {
+            true => format!(
+                "gravity of {:.2} m/s² without, {:.2} m/s² with the correction",
+                self.gravity.mean.norm(),
+                corrected.gravity.mean.norm()
+            ),
+            false => format!(
+                "median distance of points from their epipolar lines {:.2} px without, {:.2} px with the correction",
+                self.rotation.median, corrected.rotation.median
+            ),
+        }
+    }
+}
+
+/// Returns whether a gain is so close to the largest one that the data does not decide.
+fn is_alternative(largest: f64, gain: f64) -> bool {
+    let [share, number] = ALTERNATIVE;
+    largest - gain <= f64::min(share * largest, number)
+}
+
+impl Recording {
+    /// Returns a recording. Images and readings are in the order of their times.
+    pub fn new(
+        readings: Vec<ImuReading>,
+        images: Vec<Image>,
+        camera: Camera,
+        body_from_camera: Se3,
+        gravity: f64,
+    ) -> Self {
+        Self { readings, images, camera, body_from_camera, gravity, distortion: 0.0, has_no_gravity: false }
+    }
+
+    /// Returns the viewing direction of a pixel in the camera's frame, with z = 1.
+    fn ray(&self, pixel: Vector2<f64>) -> Vector3<f64> {
+        let distorted = self.camera.ray(pixel).xy();
+        let mut point = distorted;
+        for _ in 0..5 {
+            point = distorted / (1.0 + self.distortion * point.norm_squared());
+        }
+        point.push(1.0)
+    }
+
+    fn corrected(&self, fault: &Fault) -> Self {
+        let mut corrected = self.clone();
+        fault.correct(&mut corrected);
+        corrected
+    }
+
+    /// Finds probable faults. There is none if the recording agrees with its calibration.
+    ///
+    /// # Errors
+    /// If too few images can be compared with the gyroscope.
+    pub fn diagnose(&self) -> Result<Diagnosis, DiagnosisError> {
+        let mut recording = self.clone();
+        let mut findings = vec![];
+        while findings.len() < MAX_FAULTS
+            && let Some((fault, evidence)) = clocks::fault(&recording)
+        {
+            fault.correct(&mut recording);
+            findings.push(Finding { fault, gain: None, evidence, alternatives: vec![] });
+        }
+        let pairs = rotation::pairs(&recording, 1).len();
+        if pairs < MIN_PAIRS && findings.is_empty() {
+            return Err(DiagnosisError::FewPairs { found: pairs });
+        }
+        let mut fit = Fit::new(&recording, 1);
+        while pairs >= MIN_PAIRS && findings.len() < MAX_FAULTS {
+            let found = recording.most_probable(&fit).or_else(|| recording.behind(&fit));
+            let Some(finding) = found else { break };
+            finding.fault.correct(&mut recording);
+            findings.push(finding);
+            fit = Fit::new(&recording, 1);
+        }
+        let Fit { rotation: RotationFit { median: residual, points, bias, .. }, gravity } = fit;
+        let (gyroscope_bias, gravity) = (bias.into(), gravity.mean.norm());
+        Ok(Diagnosis { findings, pairs, points, residual, gravity, gyroscope_bias })
+    }
+
+    /// Judges a fault with every `stride`-th pair of images.
+    fn judge(&self, null: &Fit, stride: usize, fault: Fault) -> Judged {
+        let corrected = self.corrected(&fault);
+        let fit = match fault.keeps_rotation() {
+            true => Fit {
+                rotation: null.rotation.clone(),
+                gravity: gravity::fit(&corrected, &null.rotation.bias),
+            },
+            false => Fit::new(&corrected, stride),
+        };
+        Judged { gain: null.gain(&fault, &fit), fault, fit }
+    }
+
+    /// Returns the most probable fault.
+    fn most_probable(&self, null: &Fit) -> Option<Finding> {
+        let screened = Fit::new(self, STRIDE);
+        let screen = |fault: Fault| self.judge(&screened, STRIDE, fault);
+        let full = |judged: Judged| self.judge(null, 1, judged.fault);
+        let mut exact: Vec<Judged> = Fault::all(self).into_iter().map(screen).collect();
+        let length = null.gravity.mean.norm();
+        if (GRAVITIES[0]..GRAVITIES[1]).contains(&length)
+            && (length - self.gravity).abs() > MIN_FACTOR * self.gravity
+        {
+            exact.push(screen(Fault::Gravity { length }));
+        }
+        exact.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        exact.truncate(BEST);
+        let offsets = (-25..=25).map(|i| 0.02 * f64::from(i));
+        let offset = self.search(offsets, &screened, |seconds| {
+            (seconds.abs() > MIN_OFFSET).then_some(Fault::TimeOffset { seconds })
+        });
+        let factors = (-8..=8).map(|i| 4_f64.powf(f64::from(i) / 8.0));
+        let factor = self.search(factors, &screened, |factor| {
+            ((factor - 1.0).abs() > MIN_FACTOR).then_some(Fault::FocalLength { factor })
+        });
+        let coefficients = (-6..=6).map(|i| 0.08 * f64::from(i));
+        let distortion = self.search(coefficients, &screened, |k| {
+            (k.abs() > MIN_DISTORTION && self.distortion == 0.0).then_some(Fault::Distortion { k })
+        });
+        let turn = rotation::fit(self, &rotation::pairs(self, 1), true).turn.log();
+        let turn = (turn.norm() > MIN_TURN).then(|| screen(Fault::Mounting { turn: turn.into() }));
+        let least = MIN_GAIN.max(MIN_SHARE * (null.rotation.cost + null.gravity.cost));
+        let probable = |judged: Vec<Judged>| -> Vec<Judged> {
+            judged.into_iter().map(full).filter(|judged| judged.gain >= least).collect()
+        };
+        let numbers = probable([offset, factor, distortion, turn].into_iter().flatten().collect());
+        let mut exact = probable(exact);
+        // a fault without a number is simpler
+        let most = |judged: &[Judged]| judged.iter().fold(0.0, |most, judged| f64::max(most, judged.gain));
+        if most(&exact) < SIMPLER * most(&numbers) {
+            exact = numbers;
+        }
+        exact.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let found = exact.first()?;
+        if matches!(found.fault, Fault::AccelerometerAxes { .. })
+            && let Some(finding) = self.behind(null)
+        {
+            return Some(finding);
+        }
+        let alternatives = exact[1..].iter().filter(|other| is_alternative(found.gain, other.gain));
+        Some(Finding {
+            fault: found.fault.clone(),
+            gain: Some(found.gain),
+            evidence: null.evidence(&found.fault, &found.fit),
+            alternatives: alternatives.map(|other| other.fault.clone()).collect(),
+        })
+    }
+
+    /// Returns the most probable fault of those that show as points behind the camera.
+    fn behind(&self, null: &Fit) -> Option<Finding> {
+        let pairs = rotation::pairs(self, 1);
+        let behind = gravity::behind(self, &pairs, &null.rotation);
+        let moves = |fault: &Fault| {
+            matches!(
+                fault,
+                Fault::AccelerometerSign | Fault::AccelerometerAxes { .. } | Fault::MountingInMillimetres
+            )
+        };
+        let judge = |fault: Fault| {
+            let judged = self.judge(null, 1, fault);
+            let corrected = gravity::behind(&self.corrected(&judged.fault), &pairs, &null.rotation);
+            (judged.gain + behind.cost - corrected.cost, judged.fault, corrected.points)
+        };
+        let is_probable = |(gain, fault, _): &(f64, Fault, usize)| match fault {
+            Fault::MountingInMillimetres => *gain >= MIN_GAIN,
+            _ => *gain >= MIN_BEHIND * behind.cost,
+        };
+        let judged = Fault::all(self).into_iter().filter(moves).map(judge);
+        let probable: Vec<(f64, Fault, usize)> = judged.filter(is_probable).collect();
+        let most = probable.iter().fold(0.0, |most, (gain, ..)| f64::max(most, *gain));
+        // the first ones are the simplest
+        let best = probable.iter().position(|(gain, fault, _)| match fault {
+            Fault::AccelerometerAxes { .. } => *gain >= most,
+            _ => *gain >= SIMPLER * most,
+        })?;
+        let others =
+            probable.iter().enumerate().filter(|(i, other)| *i != best && is_alternative(most, other.0));
+        let alternatives = others.map(|(_, (_, fault, _))| fault.clone()).collect();
+        let (gain, fault, points) = &probable[best];
+        let evidence = format!(
+            "{} of {} points are behind the camera without, {points} with the correction",
+            behind.points, null.rotation.points
+        );
+        Some(Finding { fault: fault.clone(), gain: Some(*gain), evidence, alternatives })
+    }
+
+    /// Searches the number of a fault, first among `values` and then between the neighbours of the best one.
+    fn search(
+        &self,
+        values: impl Iterator<Item = f64>,
+        null: &Fit,
+        fault: impl Fn(f64) -> Option<Fault>,
+    ) -> Option<Judged> {
+        let judge = |value: f64| fault(value).map(|fault| self.judge(null, STRIDE, fault));
+        let gain = |judged: &Option<Judged>| judged.as_ref().map_or(0.0, |judged| judged.gain);
+        let values: Vec<f64> = values.collect();
+        let judged: Vec<_> = values.iter().map(|value| judge(*value)).collect();
+        let best = (0..values.len()).max_by(|a, b| gain(&judged[*a]).total_cmp(&gain(&judged[*b])))?;
+        let mut found = judged.into_iter().nth(best)?;
+        let mut at = values[best];
+        let mut step = 0.5
+            * (values.get(best + 1).unwrap_or(&at) - at)
+                .abs()
+                .max((at - values[best.saturating_sub(1)]).abs());
+        for _ in 0..8 {
+            for next in [at - step, at + step] {
+                let candidate = judge(next);
+                if gain(&candidate) > gain(&found) {
+                    (at, found) = (next, candidate);
+                    break;
+                }
+            }
+            step *= 0.5;
+        }
+        found
+    }
+}
