@@ -8,6 +8,8 @@ mod clocks;
 mod faults;
 mod gravity;
 mod rotation;
+#[cfg(test)]
+mod tests;
 
 pub use faults::{Axes, Fault, Sensor};
 
@@ -86,8 +88,6 @@ pub struct Diagnosis {
     pub residual: f64,
     /// Length of gravity, in m/s², with all corrections.
     pub gravity: f64,
-    /// Bias of the gyroscope, in rad/s, with all corrections.
-    pub gyroscope_bias: [f64; 3],
 }
 
 /// The reason why a recording cannot be diagnosed.
@@ -217,9 +217,8 @@ impl Recording {
             findings.push(finding);
             fit = Fit::new(&recording, 1);
         }
-        let Fit { rotation: RotationFit { median: residual, points, bias, .. }, gravity } = fit;
-        let (gyroscope_bias, gravity) = (bias.into(), gravity.mean.norm());
-        Ok(Diagnosis { findings, pairs, points, residual, gravity, gyroscope_bias })
+        let Fit { rotation: RotationFit { median: residual, points, .. }, gravity } = fit;
+        Ok(Diagnosis { findings, pairs, points, residual, gravity: gravity.mean.norm() })
     }
 
     /// Judges a fault with every `stride`-th pair of images.
@@ -249,16 +248,16 @@ impl Recording {
         }
         exact.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         exact.truncate(BEST);
-        let offsets = (-25..=25).map(|i| 0.02 * f64::from(i));
-        let offset = self.search(offsets, &screened, |seconds| {
+        let offsets: Vec<f64> = (-25..=25).map(|i| 0.02 * f64::from(i)).collect();
+        let offset = self.search(&offsets, &screened, null, |seconds| {
             (seconds.abs() > MIN_OFFSET).then_some(Fault::TimeOffset { seconds })
         });
-        let factors = (-8..=8).map(|i| 4_f64.powf(f64::from(i) / 8.0));
-        let factor = self.search(factors, &screened, |factor| {
+        let factors: Vec<f64> = (-8..=8).map(|i| 4_f64.powf(f64::from(i) / 8.0)).collect();
+        let factor = self.search(&factors, &screened, null, |factor| {
             ((factor - 1.0).abs() > MIN_FACTOR).then_some(Fault::FocalLength { factor })
         });
-        let coefficients = (-6..=6).map(|i| 0.08 * f64::from(i));
-        let distortion = self.search(coefficients, &screened, |k| {
+        let coefficients: Vec<f64> = (-6..=6).map(|i| 0.08 * f64::from(i)).collect();
+        let distortion = self.search(&coefficients, &screened, null, |k| {
             (k.abs() > MIN_DISTORTION && self.distortion == 0.0).then_some(Fault::Distortion { k })
         });
         let turn = rotation::fit(self, &rotation::pairs(self, 1), true).turn.log();
@@ -274,6 +273,16 @@ impl Recording {
         if most(&exact) < SIMPLER * most(&numbers) {
             exact = numbers;
         }
+        let most = most(&exact);
+        exact.retain(|judged| is_alternative(most, judged.gain));
+        // a mirrored image differs from a camera that is turned only by the points behind it
+        if exact.len() > 1 && !exact.iter().any(|judged| judged.fault.keeps_rotation()) {
+            for judged in &mut exact {
+                let corrected = self.corrected(&judged.fault);
+                let pairs = rotation::pairs(&corrected, 1);
+                judged.gain -= gravity::behind(&corrected, &pairs, &judged.fit.rotation).cost;
+            }
+        }
         exact.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let found = exact.first()?;
         if matches!(found.fault, Fault::AccelerometerAxes { .. })
@@ -281,10 +290,11 @@ impl Recording {
         {
             return Some(finding);
         }
-        let alternatives = exact[1..].iter().filter(|other| is_alternative(found.gain, other.gain));
+        let alternatives =
+            exact[1..].iter().filter(|other| is_alternative(most, most + other.gain - found.gain));
         Some(Finding {
             fault: found.fault.clone(),
-            gain: Some(found.gain),
+            gain: Some(null.gain(&found.fault, &found.fit)),
             evidence: null.evidence(&found.fault, &found.fit),
             alternatives: alternatives.map(|other| other.fault.clone()).collect(),
         })
@@ -328,34 +338,50 @@ impl Recording {
         Some(Finding { fault: fault.clone(), gain: Some(*gain), evidence, alternatives })
     }
 
-    /// Searches the number of a fault, first among `values` and then between the neighbours of the best one.
+    /// Searches the number of a fault: among `values`, then between the neighbours of the best one, at last with all
+    /// pairs of images.
     fn search(
         &self,
-        values: impl Iterator<Item = f64>,
+        values: &[f64],
+        screened: &Fit,
         null: &Fit,
         fault: impl Fn(f64) -> Option<Fault>,
     ) -> Option<Judged> {
-        let judge = |value: f64| fault(value).map(|fault| self.judge(null, STRIDE, fault));
-        let gain = |judged: &Option<Judged>| judged.as_ref().map_or(0.0, |judged| judged.gain);
-        let values: Vec<f64> = values.collect();
-        let judged: Vec<_> = values.iter().map(|value| judge(*value)).collect();
+        let coarse = |value: f64| fault(value).map(|fault| self.judge(screened, STRIDE, fault));
+        let fine = |value: f64| fault(value).map(|fault| self.judge(null, 1, fault));
+        let judged: Vec<_> = values.iter().map(|value| coarse(*value)).collect();
         let best = (0..values.len()).max_by(|a, b| gain(&judged[*a]).total_cmp(&gain(&judged[*b])))?;
-        let mut found = judged.into_iter().nth(best)?;
-        let mut at = values[best];
-        let mut step = 0.5
-            * (values.get(best + 1).unwrap_or(&at) - at)
-                .abs()
-                .max((at - values[best.saturating_sub(1)]).abs());
-        for _ in 0..8 {
-            for next in [at - step, at + step] {
-                let candidate = judge(next);
-                if gain(&candidate) > gain(&found) {
-                    (at, found) = (next, candidate);
-                    break;
-                }
-            }
-            step *= 0.5;
+        let neighbour = if best == 0 { 1 } else { best - 1 };
+        let step = 0.5 * (values.get(neighbour)? - values[best]).abs();
+        let (at, found) = refine(coarse, values[best], step, 3);
+        if gain(&found) < MIN_GAIN / (2 * STRIDE) as f64 {
+            return None;
         }
-        found
+        refine(fine, at, step / 4.0, 6).1
     }
+}
+
+fn gain(judged: &Option<Judged>) -> f64 {
+    judged.as_ref().map_or(0.0, |judged| judged.gain)
+}
+
+/// Halves a step, and takes it while the gain grows. Returns the best value.
+fn refine(
+    judge: impl Fn(f64) -> Option<Judged>,
+    mut at: f64,
+    mut step: f64,
+    halvings: usize,
+) -> (f64, Option<Judged>) {
+    let mut found = judge(at);
+    for _ in 0..halvings {
+        for next in [at - step, at + step] {
+            let candidate = judge(next);
+            if gain(&candidate) > gain(&found) {
+                (at, found) = (next, candidate);
+                break;
+            }
+        }
+        step *= 0.5;
+    }
+    (at, found)
 }

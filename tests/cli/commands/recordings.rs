@@ -1,3 +1,4 @@
 //! Commands on recordings and trajectories.
+mod doctor;
 mod evaluate;
 mod vio;

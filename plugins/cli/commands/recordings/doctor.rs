@@ -48,7 +48,7 @@ impl Doctor {
 }
 
 fn text(diagnosis: &Diagnosis) -> String {
-    let Diagnosis { findings, pairs, points, residual, gravity, gyroscope_bias } = diagnosis;
+    let Diagnosis { findings, pairs, points, residual, gravity } = diagnosis;
     let mut text = String::new();
     for (i, Finding { fault, gain, evidence, alternatives }) in findings.iter().enumerate() {
         let _ = writeln!(text, "{}. {fault}", i + 1);
@@ -64,11 +64,9 @@ fn text(diagnosis: &Diagnosis) -> String {
     };
     let _ = writeln!(
         text,
-        "{}, {}: median distance from their epipolar lines {residual:.2} px",
-        count(*pairs, "pair of images"),
-        count(*points, "point")
+        "{} in {} of images: median distance from their epipolar lines {residual:.2} px; gravity {gravity:.2} m/s²",
+        count(*points, "point"),
+        count(*pairs, "pair")
     );
-    let [x, y, z] = gyroscope_bias;
-    let _ = writeln!(text, "gravity {gravity:.2} m/s², bias of the gyroscope ({x:.4}, {y:.4}, {z:.4}) rad/s");
     text
 }
