@@ -6,7 +6,7 @@ mod values;
 
 use crate::chosen::{What, factor, known, loss};
 use crate::errors;
-use crate::input::{Columns, key_rows, keys, to_python};
+use crate::input::{Columns, key_of, key_rows, keys, to_python};
 use crate::threads::detach;
 use manifactor::graph::catalogue::find;
 use manifactor::graph::{Factor, FactorEntry, Fixed, Graph as Inner, GraphError, Key};
@@ -94,15 +94,16 @@ impl Graph {
     /// Fixes a variable at its initial value, either entirely or only in the given directions of its
     /// tangent space.
     #[pyo3(signature = (key, directions = None))]
-    fn fix(&mut self, key: &str, directions: Option<Vec<String>>) -> PyResult<()> {
-        let key = crate::input::key("fix", key)?;
+    fn fix(&mut self, key: &Bound<'_, PyAny>, directions: Option<Vec<String>>) -> PyResult<()> {
+        let key = key_of("fix", key)?;
         let fixed = directions.map_or(Fixed::Whole(true), Fixed::Directions);
         self.0.change("graph")?.set_fixed(key, fixed);
         Ok(())
     }
 
     /// Removes the constraint of `fix` from a variable.
-    fn free(&mut self, key: &str) -> PyResult<()> {
+    fn free(&mut self, key: &Bound<'_, PyAny>) -> PyResult<()> {
+        let key = key_of("free", key)?;
         self.0.change("graph")?.set_fixed(key, Fixed::Whole(false));
         Ok(())
     }
@@ -161,6 +162,23 @@ impl Graph {
         self.0.factors().len()
     }
 
+    /// Returns a graph with the factors and fixed variables of both.
+    fn __add__(&self, other: PyRef<'_, Self>) -> Self {
+        let mut sum = self.0.copy();
+        // a copy can be changed
+        if let Ok(graph) = sum.change("graph") {
+            extend(graph, &other.0);
+        }
+        Self(sum)
+    }
+
+    fn __iadd__(slf: &Bound<'_, Self>, other: &Bound<'_, Self>) -> PyResult<()> {
+        // both may be one object
+        let other = other.borrow().0.snapshot();
+        extend(slf.borrow_mut().0.change("graph")?, &other);
+        Ok(())
+    }
+
     fn __copy__(&self) -> Self {
         Self(self.0.copy())
     }
@@ -203,6 +221,11 @@ impl Graph {
         }
         types
     }
+}
+
+fn extend(graph: &mut Inner, other: &Inner) {
+    graph.factors_mut().extend(other.factors().iter().cloned());
+    other.fixed().iter().for_each(|(key, fixed)| graph.set_fixed(key.clone(), fixed.clone()));
 }
 
 /// A class, its arguments, and a state, from which `pickle` creates an object.

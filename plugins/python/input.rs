@@ -8,5 +8,5 @@ mod node;
 pub(crate) use arrays::{Numbers, any_numbers, array, frozen, numbers, numbers_or_nan, to_array};
 pub(crate) use columns::Columns;
 pub(crate) use fields::fields;
-pub(crate) use keys::{key, key_rows, keys};
+pub(crate) use keys::{key_of, key_rows, keys};
 pub(crate) use node::{Untagged, json_to_python, node, to_python, unchangeable};

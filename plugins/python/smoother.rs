@@ -2,7 +2,7 @@
 use crate::chosen::{What, solver};
 use crate::errors;
 use crate::graph::{Graph, Shared, Values};
-use crate::input::{keys, node, to_array, to_python};
+use crate::input::{key_of, keys, node, to_array, to_python};
 use crate::solution::Watch;
 use crate::threads::detach;
 use manifactor::config::Errors;
@@ -92,15 +92,16 @@ impl Smoother {
     }
 
     /// The estimate of a variable after the last update.
-    fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
-        match self.0.estimate(key) {
+    fn __getitem__<'py>(&self, py: Python<'py>, key: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let key = key_of("Smoother", key)?;
+        match self.0.estimate(key.as_str()) {
             Some(value) => What::Variable(value.into()).into_python(py),
             None => Err(pyo3::exceptions::PyKeyError::new_err(format!("there is no variable `{key}`"))),
         }
     }
 
-    fn __contains__(&self, key: &str) -> bool {
-        self.0.estimate(key).is_some()
+    fn __contains__(&self, key: &Bound<'_, PyAny>) -> bool {
+        key_of("Smoother", key).is_ok_and(|key| self.0.estimate(key.as_str()).is_some())
     }
 
     fn __len__(&self) -> usize {

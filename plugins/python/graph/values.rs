@@ -3,7 +3,7 @@ use super::{Reduced, Shared, html, pickled, unpickled};
 use crate::algebra::ValueArray;
 use crate::chosen::{What, known, variable};
 use crate::errors;
-use crate::input::{Columns, fields, key, key_rows};
+use crate::input::{Columns, fields, key_of, key_rows};
 use indexmap::IndexMap;
 use manifactor::graph::catalogue::{Entry, find};
 use manifactor::graph::{Key, Values as Inner, Variable};
@@ -29,33 +29,70 @@ impl Values {
         }
         let mut made = Self::default();
         for (key, value) in values.cast::<PyDict>()? {
-            made.__setitem__(&key.extract::<String>()?, &value)?;
+            made.__setitem__(&key, &value)?;
         }
         Ok(made)
     }
 
-    fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
-        match self.0.variable(key) {
+    fn __getitem__<'py>(&self, py: Python<'py>, key: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let key = key_of("Values", key)?;
+        match self.0.variable(key.as_str()) {
             Some(value) => What::Variable(value.erased().clone_box().into()).into_python(py),
             None => Err(PyKeyError::new_err(format!("there is no variable `{key}`"))),
         }
     }
 
-    fn __setitem__(&mut self, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
-        let (key, value) = (self::key("Values", key)?, variable("value", value)?);
+    fn __setitem__(&mut self, key: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<()> {
+        let (key, value) = (key_of("Values", key)?, variable("value", value)?);
         self.0.change("values")?.insert_boxed(key, value.erased().clone_box());
         Ok(())
     }
 
-    fn __delitem__(&mut self, key: &str) -> PyResult<()> {
-        match self.0.change("values")?.remove(key) {
+    fn __delitem__(&mut self, key: &Bound<'_, PyAny>) -> PyResult<()> {
+        let key = key_of("Values", key)?;
+        match self.0.change("values")?.remove(key.as_str()) {
             Some(_) => Ok(()),
             None => Err(PyKeyError::new_err(format!("there is no variable `{key}`"))),
         }
     }
 
-    fn __contains__(&self, key: &str) -> bool {
-        self.0.contains(key)
+    fn __contains__(&self, key: &Bound<'_, PyAny>) -> bool {
+        key_of("Values", key).is_ok_and(|key| self.0.contains(key.as_str()))
+    }
+
+    /// Returns the value of a key, or `default` if there is none.
+    #[pyo3(signature = (key, default = None))]
+    fn get<'py>(
+        &self,
+        py: Python<'py>,
+        key: &Bound<'py, PyAny>,
+        default: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Option<Bound<'py, PyAny>>> {
+        match self.0.contains(key_of("Values", key)?.as_str()) {
+            true => self.__getitem__(py, key).map(Some),
+            false => Ok(default),
+        }
+    }
+
+    /// Returns all keys with their values, in insertion order.
+    fn items<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+        let item = |(key, value): (&Key, &dyn Variable)| {
+            let value = What::Variable(value.erased().clone_box().into()).into_python(py)?;
+            Ok((key.as_str().to_owned(), value))
+        };
+        self.0.iter().map(item).collect()
+    }
+
+    /// Inserts the values of a dict or of another `Values`. Existing values of these keys are replaced.
+    fn update(slf: &Bound<'_, Self>, values: &Bound<'_, PyAny>) -> PyResult<()> {
+        // a copy, because `values` may be this object
+        let other = Self::new(Some(values))?;
+        let mut this = slf.borrow_mut();
+        let inner = this.0.change("values")?;
+        for (key, value) in other.0.iter() {
+            inner.insert_boxed(key.clone(), value.erased().clone_box());
+        }
+        Ok(())
     }
 
     fn __len__(&self) -> usize {

@@ -1,10 +1,10 @@
-//! Keys: texts, or integers with a prefix.
+//! Keys: texts, or whole numbers with a prefix.
 use super::arrays::{any_numbers, array};
 use crate::errors;
 use manifactor::graph::Key;
 use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::types::{PyBool, PyString, PyTuple};
 use std::collections::HashMap;
 
 /// Returns a key, which has at least one character, as in documents.
@@ -15,18 +15,46 @@ pub(crate) fn key(what: &str, text: &str) -> PyResult<Key> {
     }
 }
 
-/// Reads the keys of one factor: one text or several.
+/// Reads one key: a text, a whole number with the prefix `x`, or a pair of prefix and number.
+pub(crate) fn key_of(what: &str, value: &Bound<'_, PyAny>) -> PyResult<Key> {
+    if let Ok(text) = value.cast::<PyString>() {
+        return key(what, &text.to_cow()?);
+    }
+    numbered(value).ok_or_else(|| {
+        let message = "expected a text, a whole number, or both: \"x0\", 0 or (\"x\", 0)";
+        errors::argument(what, "key", message)
+    })
+}
+
+/// Returns the key of a whole number, or of a pair of prefix and number; `None` for everything else.
+fn numbered(value: &Bound<'_, PyAny>) -> Option<Key> {
+    let whole = |value: &Bound<'_, PyAny>| match value.is_instance_of::<PyBool>() {
+        true => None,
+        false => value.extract::<i64>().ok(),
+    };
+    let Ok(pair) = value.cast::<PyTuple>() else { return Some(Key::indexed("x", whole(value)?)) };
+    let [prefix, number] = pair.iter().collect::<Vec<_>>().try_into().ok()?;
+    Some(Key::indexed(&prefix.cast::<PyString>().ok()?.to_cow().ok()?, whole(&number)?))
+}
+
+/// Reads the keys of one factor: one key or several.
 pub(crate) fn keys(what: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Key>> {
     if let Ok(key) = value.cast::<PyString>() {
         return Ok(vec![self::key(what, &key.to_cow()?)?]);
     }
-    let expected =
-        || errors::argument(what, "keys", "expected a text, or several: \"x0\", or [\"x0\", \"x1\"]");
-    let items = value.try_iter().map_err(|_| expected())?;
-    let text = |item: PyResult<Bound<'_, PyAny>>| {
-        key(what, &item?.cast::<PyString>().map_err(|_| expected())?.to_cow()?)
+    if let Some(key) = numbered(value) {
+        return Ok(vec![key]);
+    }
+    let expected = || {
+        let message = "expected a key, or several: \"x0\", [\"x0\", \"x1\"] or [0, (\"p\", 1)]";
+        errors::argument(what, "keys", message)
     };
-    items.map(text).collect()
+    let items = value.try_iter().map_err(|_| expected())?;
+    let one = |item: Bound<'_, PyAny>| match item.cast::<PyString>() {
+        Ok(text) => key(what, &text.to_cow()?),
+        Err(_) => numbered(&item).ok_or_else(expected),
+    };
+    items.map(|item| one(item?)).collect()
 }
 
 /// Reads one prefix or several. A prefix may be empty, because a number follows.

@@ -13,8 +13,10 @@ from .rerun import Live
 __version__: str
 
 _Array = NDArray[np.float64]
-_Keys = str | Sequence[str]
-_KeyRows = Sequence[str] | Sequence[Sequence[str]] | NDArray[Any]
+_Key = str | int | tuple[str, int]
+_ByKey = Mapping[str, Variable] | Mapping[int, Variable] | Mapping[tuple[str, int], Variable]
+_Keys = _Key | Sequence[_Key]
+_KeyRows = Sequence[_Key] | Sequence[Sequence[_Key]] | NDArray[Any]
 
 class Chosen:
     """An immutable object of a registered type."""
@@ -84,7 +86,8 @@ class Graph:
     ) -> int:
         """Adds a factor between variables, and returns its index in the graph, from 0.
 
-        `keys` are the names of its variables, in the order of the residual's arguments. `noise` may be a
+        `keys` are the names of its variables, in the order of the residual's arguments: `["x0", "p3"]` or
+        `[0, ("p", 3)]`. A number alone has the prefix `x`. `noise` may be a
         number, which is a sigma for all rows. `noise` defaults to a standard deviation of 1 in every row,
         `loss` to none, and `name`, which reports use, to the name of the factor's type. A wrong number of
         keys, a repeated key and noise of a wrong size raise a `GraphError`."""
@@ -106,10 +109,10 @@ class Graph:
         are `prefix` plus the number; there may be one prefix per column. `noise` is shared by all, or a
         dict of one of its forms with an array: `{"sigmas": array}`, shape (n, m). After an error, nothing
         is added."""
-    def fix(self, key: str, directions: Sequence[str] | None = None) -> None:
+    def fix(self, key: _Key, directions: Sequence[str] | None = None) -> None:
         """Fixes a variable at its initial value, either entirely or only in the given directions of its
         tangent space."""
-    def free(self, key: str) -> None:
+    def free(self, key: _Key) -> None:
         """Removes the constraint of `fix` from a variable."""
     @property
     def fixed(self) -> Mapping[str, bool | list[str]]:
@@ -128,6 +131,9 @@ class Graph:
         """A copy of the factor at an index, from 0, as in documents: `keys`, `factor`, `noise`, `loss`,
         `name`."""
     def __len__(self) -> int: ...
+    def __add__(self, other: Graph) -> Graph:
+        """Returns a graph with the factors and fixed variables of both."""
+    def __iadd__(self, other: Graph) -> Self: ...
     def __copy__(self) -> Graph: ...
     def __deepcopy__(self, memo: Any) -> Graph: ...
     def _repr_html_(self) -> str: ...
@@ -136,16 +142,22 @@ class Graph:
 class Values:
     """The values of the variables by key, in insertion order."""
 
-    def __new__(cls, values: Mapping[str, Variable] | Values | None = None) -> Self:
+    def __new__(cls, values: _ByKey | Values | None = None) -> Self:
         """Creates empty values, or copies those of a dict or of another `Values`."""
-    def __getitem__(self, key: str) -> Variable: ...
-    def __setitem__(self, key: str, value: Variable) -> None: ...
-    def __delitem__(self, key: str) -> None: ...
+    def __getitem__(self, key: _Key) -> Variable: ...
+    def __setitem__(self, key: _Key, value: Variable) -> None: ...
+    def __delitem__(self, key: _Key) -> None: ...
     def __contains__(self, key: object) -> bool: ...
     def __len__(self) -> int: ...
     def __iter__(self) -> Iterator[str]: ...
     def keys(self) -> list[str]:
         """Returns all keys in insertion order."""
+    def items(self) -> list[tuple[str, Variable]]:
+        """Returns all keys with their values, in insertion order."""
+    def get(self, key: _Key, default: Variable | None = None) -> Variable | None:
+        """Returns the value of a key, or `default` if there is none."""
+    def update(self, values: _ByKey | Values) -> None:
+        """Inserts the values of a dict or of another `Values`. Existing values of these keys are replaced."""
     def insert_many(
         self,
         keys: _KeyRows,
@@ -243,7 +255,7 @@ class Smoother:
     def update(self) -> dict[str, Any]:
         """Applies the changes, and updates the estimate. Returns a report: `redone`, `relinearized`,
         `parked`, `undetermined` and so on. After an error, the smoother is unchanged."""
-    def __getitem__(self, key: str) -> Variable:
+    def __getitem__(self, key: _Key) -> Variable:
         """The estimate of a variable after the last update."""
     def __contains__(self, key: object) -> bool: ...
     def __len__(self) -> int: ...

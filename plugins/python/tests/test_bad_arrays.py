@@ -117,7 +117,7 @@ def test_noise(noise: Any, message: str | None) -> None:
         (KEYS.astype(float), "keys: expected texts or whole numbers"),
         (np.zeros((N, 2, 2), int), "keys: expected an array of one or two axes, got 3"),
         ([("a", "b"), ("c",)], "keys: row 1 has 1 keys, those before it 2"),
-        ([("a", 3)], "keys: expected a text, or several"),
+        ([("a", 3.5)], "keys: expected a key, or several"),
         (7, "keys: expected texts by rows"),
     ],
 )
