@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Self, final
+from typing import Any, Self, SupportsIndex, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,8 +13,8 @@ from .rerun import Live
 __version__: str
 
 _Array = NDArray[np.float64]
-_Key = str | int | tuple[str, int]
-_ByKey = Mapping[str, Variable] | Mapping[int, Variable] | Mapping[tuple[str, int], Variable]
+_Key = str | SupportsIndex | tuple[str, SupportsIndex]
+_ByKey = Mapping[Any, Variable]
 _Keys = _Key | Sequence[_Key]
 _KeyRows = Sequence[_Key] | Sequence[Sequence[_Key]] | NDArray[Any]
 

@@ -11,11 +11,11 @@ import pytest
 
 def chain() -> tuple[mf.Graph, mf.Values]:
     graph, values = mf.Graph(), mf.Values()
-    graph.add(0, mf.prior_se2(value=mf.Se2(translation=[0, 0], rotation=0)), noise=0.1)
-    graph.add([0, 1], mf.between_se2(relative=mf.Se2(translation=[1, 0], rotation=0)), noise=0.1)
-    graph.add([1, ("x", 2)], mf.between_se2(relative=mf.Se2(translation=[1, 0], rotation=0)), noise=0.1)
+    graph.add(0, mf.prior_se2(value=mf.Se2(translation=[0, 0], angle=0)), noise=0.1)
+    graph.add([0, 1], mf.between_se2(relative=mf.Se2(translation=[1, 0], angle=0)), noise=0.1)
+    graph.add([1, ("x", 2)], mf.between_se2(relative=mf.Se2(translation=[1, 0], angle=0)), noise=0.1)
     for i in range(3):
-        values["x", i] = mf.Se2(translation=[0, 0], rotation=0)
+        values["x", i] = mf.Se2(translation=[0, 0], angle=0)
     return graph, values
 
 
@@ -61,7 +61,7 @@ def test_values_are_read_and_updated_as_a_dict_is() -> None:
 def test_graphs_add_up() -> None:
     graph, values = chain()
     closure = mf.Graph()
-    closure.add([0, 2], mf.between_se2(relative=mf.Se2(translation=[2.3, 0], rotation=0)), noise=0.1)
+    closure.add([0, 2], mf.between_se2(relative=mf.Se2(translation=[2.3, 0], angle=0)), noise=0.1)
     closure.fix(0)
     both = graph + closure
     assert (len(graph), len(closure), len(both)) == (3, 1, 4) and dict(both.fixed) == {"x0": True}
