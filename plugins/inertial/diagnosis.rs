@@ -44,8 +44,10 @@ const MIN_DISTORTION: f64 = 0.03;
 const MIN_TURN: f64 = 0.03;
 /// Plausible lengths of gravity, in m/s². That of the Moon is 1.6 m/s².
 const GRAVITIES: [f64; 2] = [0.3, 30.0];
-/// Largest number of faults of one recording.
-const MAX_FAULTS: usize = 4;
+/// Largest median distance of points from their epipolar lines, in pixels, in a recording without a fault.
+const MAX_RESIDUAL: f64 = 2.0;
+/// Largest number of faults of one recording. Enough corrections would explain any points.
+const MAX_FAULTS: usize = 2;
 
 /// A visual-inertial recording with its calibration.
 #[derive(Debug, Clone)]
@@ -88,6 +90,9 @@ pub struct Diagnosis {
     pub residual: f64,
     /// Length of gravity, in m/s², with all corrections.
     pub gravity: f64,
+    /// Whether the recording agrees with its calibration, with all corrections. If not, it has a fault without a
+    /// correction.
+    pub is_explained: bool,
 }
 
 /// The reason why a recording cannot be diagnosed.
@@ -104,6 +109,18 @@ pub enum DiagnosisError {
         /// Number of such pairs.
         found: usize,
     },
+    /// A sensor always has the same reading.
+    #[error("all readings of the {sensor} are equal: the {sensor} did not measure, or its columns are wrong")]
+    Constant {
+        /// Gyroscope or accelerometer.
+        sensor: &'static str,
+    },
+    /// The likelihood cannot be computed.
+    #[error(
+        "the likelihood of the recording is not finite: check `camera`, `body_from_camera` and `settings.gravity` for \
+         numbers that are far too large or too small"
+    )]
+    NotFinite,
 }
 
 /// The likelihood of a recording.
@@ -127,6 +144,13 @@ impl Fit {
         let rotation = rotation::fit(recording, &rotation::pairs(recording, stride), false);
         let gravity = gravity::fit(recording, &rotation.bias);
         Self { rotation, gravity }
+    }
+
+    fn check(&self) -> Result<(), DiagnosisError> {
+        let is_finite = self.rotation.cost.is_finite()
+            && self.rotation.median.is_finite()
+            && self.gravity.cost.is_finite();
+        if is_finite { Ok(()) } else { Err(DiagnosisError::NotFinite) }
     }
 
     /// Returns the gain from this fit to that of a corrected recording.
@@ -156,6 +180,12 @@ impl Fit {
             ),
         }
     }
+}
+
+/// Returns whether no fault of this kind was found before.
+fn is_new(fault: &Fault, found_before: &[Finding]) -> bool {
+    let kind = std::mem::discriminant(fault);
+    found_before.iter().all(|finding| std::mem::discriminant(&finding.fault) != kind)
 }
 
 /// Returns whether a gain is so close to the largest one that the data does not decide.
@@ -195,8 +225,9 @@ impl Recording {
     /// Finds probable faults. There is none if the recording agrees with its calibration.
     ///
     /// # Errors
-    /// If too few images can be compared with the gyroscope.
+    /// If too few images can be compared with the gyroscope, a sensor always has the same reading, or numbers overflow.
     pub fn diagnose(&self) -> Result<Diagnosis, DiagnosisError> {
+        self.check_sensors()?;
         let mut recording = self.clone();
         let mut findings = vec![];
         while findings.len() < MAX_FAULTS
@@ -211,14 +242,31 @@ impl Recording {
         }
         let mut fit = Fit::new(&recording, 1);
         while pairs >= MIN_PAIRS && findings.len() < MAX_FAULTS {
-            let found = recording.most_probable(&fit).or_else(|| recording.behind(&fit));
+            fit.check()?;
+            let found =
+                recording.most_probable(&fit, &findings).or_else(|| recording.behind(&fit, &findings));
             let Some(finding) = found else { break };
             finding.fault.correct(&mut recording);
             findings.push(finding);
             fit = Fit::new(&recording, 1);
         }
+        fit.check()?;
         let Fit { rotation: RotationFit { median: residual, points, .. }, gravity } = fit;
-        Ok(Diagnosis { findings, pairs, points, residual, gravity: gravity.mean.norm() })
+        let is_explained = residual <= MAX_RESIDUAL;
+        Ok(Diagnosis { findings, pairs, points, residual, gravity: gravity.mean.norm(), is_explained })
+    }
+
+    fn check_sensors(&self) -> Result<(), DiagnosisError> {
+        let is_constant = |of: fn(&ImuReading) -> Vector3<f64>| {
+            self.readings.len() > 1 && self.readings.windows(2).all(|two| of(&two[0]) == of(&two[1]))
+        };
+        if is_constant(|reading| reading.gyroscope) {
+            return Err(DiagnosisError::Constant { sensor: "gyroscope" });
+        }
+        if is_constant(|reading| reading.accelerometer) {
+            return Err(DiagnosisError::Constant { sensor: "accelerometer" });
+        }
+        Ok(())
     }
 
     /// Judges a fault with every `stride`-th pair of images.
@@ -235,11 +283,12 @@ impl Recording {
     }
 
     /// Returns the most probable fault.
-    fn most_probable(&self, null: &Fit) -> Option<Finding> {
+    fn most_probable(&self, null: &Fit, found_before: &[Finding]) -> Option<Finding> {
         let screened = Fit::new(self, STRIDE);
         let screen = |fault: Fault| self.judge(&screened, STRIDE, fault);
         let full = |judged: Judged| self.judge(null, 1, judged.fault);
-        let mut exact: Vec<Judged> = Fault::all(self).into_iter().map(screen).collect();
+        let is_new = |fault: &Fault| is_new(fault, found_before);
+        let mut exact: Vec<Judged> = Fault::all(self).into_iter().filter(is_new).map(screen).collect();
         let length = null.gravity.mean.norm();
         if (GRAVITIES[0]..GRAVITIES[1]).contains(&length)
             && (length - self.gravity).abs() > MIN_FACTOR * self.gravity
@@ -266,7 +315,8 @@ impl Recording {
         let probable = |judged: Vec<Judged>| -> Vec<Judged> {
             judged.into_iter().map(full).filter(|judged| judged.gain >= least).collect()
         };
-        let numbers = probable([offset, factor, distortion, turn].into_iter().flatten().collect());
+        let numbers = [offset, factor, distortion, turn].into_iter().flatten();
+        let numbers = probable(numbers.filter(|judged| is_new(&judged.fault)).collect());
         let mut exact = probable(exact);
         // a fault without a number is simpler
         let most = |judged: &[Judged]| judged.iter().fold(0.0, |most, judged| f64::max(most, judged.gain));
@@ -286,7 +336,7 @@ impl Recording {
         exact.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let found = exact.first()?;
         if matches!(found.fault, Fault::AccelerometerAxes { .. })
-            && let Some(finding) = self.behind(null)
+            && let Some(finding) = self.behind(null, found_before)
         {
             return Some(finding);
         }
@@ -301,7 +351,7 @@ impl Recording {
     }
 
     /// Returns the most probable fault of those that show as points behind the camera.
-    fn behind(&self, null: &Fit) -> Option<Finding> {
+    fn behind(&self, null: &Fit, found_before: &[Finding]) -> Option<Finding> {
         let pairs = rotation::pairs(self, 1);
         let behind = gravity::behind(self, &pairs, &null.rotation);
         let moves = |fault: &Fault| {
@@ -319,7 +369,8 @@ impl Recording {
             Fault::MountingInMillimetres => *gain >= MIN_GAIN,
             _ => *gain >= MIN_BEHIND * behind.cost,
         };
-        let judged = Fault::all(self).into_iter().filter(moves).map(judge);
+        let is_new = |fault: &Fault| is_new(fault, found_before);
+        let judged = Fault::all(self).into_iter().filter(moves).filter(is_new).map(judge);
         let probable: Vec<(f64, Fault, usize)> = judged.filter(is_probable).collect();
         let most = probable.iter().fold(0.0, |most, (gain, ..)| f64::max(most, *gain));
         // the first ones are the simplest

@@ -115,7 +115,8 @@ impl View {
         direction: &Vector3<f64>,
     ) -> (f64, f64) {
         let spread = (direction.cross(a).norm_squared() + direction.cross(b).norm_squared()).sqrt();
-        let factor = camera.fx / spread.max(MIN_SINE);
+        // far from the centre, a pixel is a smaller angle: without this, a tiny focal length would explain all points
+        let factor = camera.fx / (spread.max(MIN_SINE) * b.z.max(MIN_SINE));
         (factor * direction.dot(&a.cross(b)), factor)
     }
 

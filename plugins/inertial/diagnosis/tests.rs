@@ -17,7 +17,7 @@ fn accelerometer(recording: &mut Recording, change: impl Fn(Vector3<f64>) -> Vec
     recording.readings.iter_mut().for_each(|reading| reading.accelerometer = change(reading.accelerometer));
 }
 
-fn pixels(recording: &mut Recording, change: impl Fn(Vector2<f64>) -> Vector2<f64>) {
+fn pixels(recording: &mut Recording, mut change: impl FnMut(Vector2<f64>) -> Vector2<f64>) {
     let points = recording.images.iter_mut().flat_map(|(_, points)| points);
     points.for_each(|(_, pixel)| *pixel = change(*pixel));
 }
@@ -134,4 +134,36 @@ fn a_recording_without_pairs_of_images_is_an_error() {
     assert!(error.to_string().contains("expected at least 10 pairs of images"), "{error}");
     recording.readings.clear();
     assert!(recording.diagnose().is_err());
+}
+
+#[test]
+fn a_dead_sensor_and_extreme_numbers_are_errors() {
+    let complaint = |plant: &dyn Fn(&mut Recording)| {
+        let mut recording = flight();
+        plant(&mut recording);
+        recording.diagnose().unwrap_err().to_string()
+    };
+    let dead = complaint(&|r| gyroscope(r, |_| Vector3::new(0.1, 0.0, 0.0)));
+    assert!(dead.starts_with("all readings of the gyroscope are equal"), "{dead}");
+    let dead = complaint(&|r| accelerometer(r, |_| Vector3::zeros()));
+    assert!(dead.starts_with("all readings of the accelerometer are equal"), "{dead}");
+    for focal in [1e-300, 1e300] {
+        assert!(complaint(&|r| r.camera.fx = focal).contains("is not finite"));
+    }
+    assert!(complaint(&|r| r.gravity = 1e300).contains("is not finite"));
+}
+
+#[test]
+fn images_of_something_else_are_not_explained() {
+    let mut recording = flight();
+    let mut seed = 1_u64;
+    pixels(&mut recording, |_| {
+        let mut next = |size: f64| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 * size
+        };
+        Vector2::new(next(752.0), next(480.0))
+    });
+    let diagnosis = recording.diagnose().unwrap();
+    assert!(!diagnosis.is_explained, "{diagnosis:?}");
 }

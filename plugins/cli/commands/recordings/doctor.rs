@@ -43,12 +43,13 @@ impl Doctor {
         } else {
             output::print(&text(&diagnosis));
         }
-        Ok(if diagnosis.findings.is_empty() { Status::Done } else { Status::FaultsFound })
+        let is_healthy = diagnosis.findings.is_empty() && diagnosis.is_explained;
+        Ok(if is_healthy { Status::Done } else { Status::FaultsFound })
     }
 }
 
 fn text(diagnosis: &Diagnosis) -> String {
-    let Diagnosis { findings, pairs, points, residual, gravity } = diagnosis;
+    let Diagnosis { findings, pairs, points, residual, gravity, is_explained } = diagnosis;
     let mut text = String::new();
     for (i, Finding { fault, gain, evidence, alternatives }) in findings.iter().enumerate() {
         let _ = writeln!(text, "{}. {fault}", i + 1);
@@ -59,6 +60,9 @@ fn text(diagnosis: &Diagnosis) -> String {
         let _ = writeln!(text, "   {evidence}{gain}");
     }
     let _ = match findings.len() {
+        _ if !is_explained => {
+            writeln!(text, "the points do not fit the IMU, and known faults do not explain this:")
+        }
         0 => writeln!(text, "no fault found"),
         n => writeln!(text, "{}; with all corrections:", count(n, "probable fault")),
     };
