@@ -14,6 +14,7 @@ mod tests;
 pub use faults::{Axes, Fault, Sensor};
 
 use crate::samples::ImuReading;
+use crate::visual::TrackedPoint;
 use gravity::GravityFit;
 use manifactor_geometry::{Camera, Se3};
 use nalgebra::{Vector2, Vector3};
@@ -21,7 +22,7 @@ use rotation::RotationFit;
 use serde::Serialize;
 
 /// An image: its time in seconds, and the pixels of numbered points.
-pub type Image = (f64, Vec<(u64, Vector2<f64>)>);
+pub type Image = (f64, Vec<TrackedPoint>);
 
 /// Smallest gain of a fault, in units of the natural logarithm, and as a share of the cost.
 const MIN_GAIN: f64 = 40.0;
@@ -252,7 +253,7 @@ impl Recording {
         }
         fit.check()?;
         let Fit { rotation: RotationFit { median: residual, points, .. }, gravity } = fit;
-        let is_explained = residual <= MAX_RESIDUAL;
+        let is_explained = pairs >= MIN_PAIRS && residual <= MAX_RESIDUAL;
         Ok(Diagnosis { findings, pairs, points, residual, gravity: gravity.mean.norm(), is_explained })
     }
 
@@ -269,7 +270,7 @@ impl Recording {
         Ok(())
     }
 
-    /// Judges a fault with every `stride`-th pair of images.
+    /// Judges a fault with every `stride`-th pair of images. `null` is the fit without the correction.
     fn judge(&self, null: &Fit, stride: usize, fault: Fault) -> Judged {
         let corrected = self.corrected(&fault);
         let fit = match fault.keeps_rotation() {
@@ -288,15 +289,16 @@ impl Recording {
         let screen = |fault: Fault| self.judge(&screened, STRIDE, fault);
         let full = |judged: Judged| self.judge(null, 1, judged.fault);
         let is_new = |fault: &Fault| is_new(fault, found_before);
-        let mut exact: Vec<Judged> = Fault::all(self).into_iter().filter(is_new).map(screen).collect();
+        let mut without_number: Vec<Judged> =
+            Fault::all(self).into_iter().filter(is_new).map(screen).collect();
         let length = null.gravity.mean.norm();
         if (GRAVITIES[0]..GRAVITIES[1]).contains(&length)
             && (length - self.gravity).abs() > MIN_FACTOR * self.gravity
         {
-            exact.push(screen(Fault::Gravity { length }));
+            without_number.push(screen(Fault::Gravity { length }));
         }
-        exact.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        exact.truncate(BEST);
+        without_number.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        without_number.truncate(BEST);
         let offsets: Vec<f64> = (-25..=25).map(|i| 0.02 * f64::from(i)).collect();
         let offset = self.search(&offsets, &screened, null, |seconds| {
             (seconds.abs() > MIN_OFFSET).then_some(Fault::TimeOffset { seconds })
@@ -307,7 +309,7 @@ impl Recording {
         });
         let coefficients: Vec<f64> = (-6..=6).map(|i| 0.08 * f64::from(i)).collect();
         let distortion = self.search(&coefficients, &screened, null, |k| {
-            (k.abs() > MIN_DISTORTION && self.distortion == 0.0).then_some(Fault::Distortion { k })
+            (k.abs() > MIN_DISTORTION).then_some(Fault::Distortion { k })
         });
         let turn = rotation::fit(self, &rotation::pairs(self, 1), true).turn.log();
         let turn = (turn.norm() > MIN_TURN).then(|| screen(Fault::Mounting { turn: turn.into() }));
@@ -315,33 +317,33 @@ impl Recording {
         let probable = |judged: Vec<Judged>| -> Vec<Judged> {
             judged.into_iter().map(full).filter(|judged| judged.gain >= least).collect()
         };
-        let numbers = [offset, factor, distortion, turn].into_iter().flatten();
-        let numbers = probable(numbers.filter(|judged| is_new(&judged.fault)).collect());
-        let mut exact = probable(exact);
+        let with_number = [offset, factor, distortion, turn].into_iter().flatten();
+        let with_number = probable(with_number.filter(|judged| is_new(&judged.fault)).collect());
+        let mut without_number = probable(without_number);
         // a fault without a number is simpler
         let most = |judged: &[Judged]| judged.iter().fold(0.0, |most, judged| f64::max(most, judged.gain));
-        if most(&exact) < SIMPLER * most(&numbers) {
-            exact = numbers;
+        if most(&without_number) < SIMPLER * most(&with_number) {
+            without_number = with_number;
         }
-        let most = most(&exact);
-        exact.retain(|judged| is_alternative(most, judged.gain));
+        let most = most(&without_number);
+        without_number.retain(|judged| is_alternative(most, judged.gain));
         // a mirrored image differs from a camera that is turned only by the points behind it
-        if exact.len() > 1 && !exact.iter().any(|judged| judged.fault.keeps_rotation()) {
-            for judged in &mut exact {
+        if without_number.len() > 1 && !without_number.iter().any(|judged| judged.fault.keeps_rotation()) {
+            for judged in &mut without_number {
                 let corrected = self.corrected(&judged.fault);
                 let pairs = rotation::pairs(&corrected, 1);
                 judged.gain -= gravity::behind(&corrected, &pairs, &judged.fit.rotation).cost;
             }
         }
-        exact.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let found = exact.first()?;
+        without_number.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let found = without_number.first()?;
         if matches!(found.fault, Fault::AccelerometerAxes { .. })
             && let Some(finding) = self.behind(null, found_before)
         {
             return Some(finding);
         }
         let alternatives =
-            exact[1..].iter().filter(|other| is_alternative(most, most + other.gain - found.gain));
+            without_number[1..].iter().filter(|other| is_alternative(most, most + other.gain - found.gain));
         Some(Finding {
             fault: found.fault.clone(),
             gain: Some(null.gain(&found.fault, &found.fit)),

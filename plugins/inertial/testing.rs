@@ -1,4 +1,5 @@
 //! A simulated flight, for tests: a room of points, an IMU that rests for a second and then moves.
+use crate::diagnosis::Image;
 use crate::samples::ImuReading;
 use manifactor_geometry::{Camera, CameraModel, ImuBias, Se3, So3};
 use nalgebra::{Vector2, Vector3, Vector6};
@@ -8,16 +9,13 @@ const RATE: usize = 200;
 /// Readings from one image to the next.
 const READINGS_PER_IMAGE: usize = 10;
 
-/// An image of the flight: its time, and the pixels of numbered points.
-pub type SimulatedImage = (f64, Vec<(u64, Vector2<f64>)>);
-
 /// A simulated flight.
 #[derive(Debug, Clone)]
 pub struct SimulatedFlight {
     /// Readings of the IMU, with bias and noise.
     pub readings: Vec<ImuReading>,
     /// Images at 20 Hz, with a noise of half a pixel. One track in ten is wrong.
-    pub images: Vec<SimulatedImage>,
+    pub images: Vec<Image>,
     /// True pose of the IMU at each image. The world's z axis points up.
     pub poses: Vec<Se3>,
     /// The true bias.

@@ -40,7 +40,8 @@ pub(super) fn fault(recording: &Recording) -> Option<(Fault, String)> {
     None
 }
 
-fn median(numbers: impl Iterator<Item = f64>) -> Option<f64> {
+/// Returns the median, the larger one of two; `None` if there are no numbers.
+pub(super) fn median(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     let mut numbers: Vec<f64> = numbers.collect();
     numbers.sort_by(f64::total_cmp);
     numbers.get(numbers.len() / 2).copied()

@@ -133,7 +133,8 @@ pub(super) fn behind(recording: &Recording, pairs: &[ImagePair], rotation: &Rota
                 time += seconds;
                 sample += 1;
             }
-            orientations.rotations[sample]
+            // readings that are not in order have no samples
+            orientations.rotations.get(sample).copied().unwrap_or_else(So3::identity)
         };
         let mut before = advance(group[0].from, &mut velocity, &mut position);
         (velocity, position) = (Vector3::zeros(), Vector3::zeros());

@@ -4,6 +4,7 @@
 //! plane with both cameras, and its distance from that plane is a residual in pixels. The direction of each pair is
 //! found in closed form, and the bias of the gyroscope by Gauss-Newton steps.
 use super::Recording;
+use super::clocks::median;
 use crate::samples::ImuReading;
 use manifactor_geometry::{Camera, So3};
 use nalgebra::{DMatrix, DVector, Matrix3, SVector, Vector2, Vector3};
@@ -159,7 +160,7 @@ pub(super) fn loss(residual: f64) -> f64 {
     (residual / SCALE).powi(2).ln_1p()
 }
 
-/// Fits the bias of the gyroscope, and the rotation of the camera if that is free. Starts at `turn`.
+/// Fits the bias of the gyroscope, and the rotation of the camera if that is free. Starts without a bias, at the given mounting.
 pub(super) fn fit(recording: &Recording, pairs: &[ImagePair], is_free: bool) -> RotationFit {
     let camera = &recording.camera;
     let mut best: Option<RotationFit> = None;
@@ -198,9 +199,9 @@ pub(super) fn fit(recording: &Recording, pairs: &[ImagePair], is_free: bool) -> 
             }
         }
         if best.as_ref().is_none_or(|best| cost < best.cost) {
-            residuals.sort_by(f64::total_cmp);
-            let median = residuals.get(residuals.len() / 2).copied().unwrap_or(0.0);
-            best = Some(RotationFit { cost, median, points: residuals.len(), bias, turn });
+            let points = residuals.len();
+            let median = median(residuals.into_iter()).unwrap_or(0.0);
+            best = Some(RotationFit { cost, median, points, bias, turn });
         }
         if step == steps {
             break;

@@ -154,6 +154,24 @@ fn a_dead_sensor_and_extreme_numbers_are_errors() {
 }
 
 #[test]
+fn a_unit_of_time_does_not_explain_a_recording_that_is_too_short() {
+    let mut recording = flight();
+    recording.images.truncate(12);
+    recording.images.iter_mut().for_each(|(time, _)| *time *= 1e3);
+    let diagnosis = recording.diagnose().unwrap();
+    assert!(diagnosis.findings.len() == 1 && !diagnosis.is_explained, "{diagnosis:?}");
+}
+
+#[test]
+fn readings_in_no_order_are_no_panic() {
+    let mut recording = flight();
+    recording.readings.swap(0, 700);
+    let _ = recording.diagnose();
+    recording.readings[3].timestamp = f64::NAN;
+    let _ = recording.diagnose();
+}
+
+#[test]
 fn images_of_something_else_are_not_explained() {
     let mut recording = flight();
     let mut seed = 1_u64;
