@@ -6,7 +6,7 @@
 //! arrived with frames.
 use crate::gravity::{GravityError, MapFrame};
 use crate::mapping::measurements::{Measurements, ObjectBox, ObjectMeasurements};
-use crate::motion::{MotionError, MotionStep, RelativePose};
+use crate::motion::{MotionError, MotionStep, RelativePose, STEP_WITH_NOISE};
 use crate::semantics::{AppliedRule, RuleCandidate, RuleError, RuleVerdict, SkippedRule, unmatched};
 use crate::settings::{DetectionSettings, OdometrySettings, RunSettings};
 use manifactor_formats::plausible;
@@ -413,8 +413,7 @@ pub fn prior_object_entry(object: &PriorObject, settings: &RunSettings) -> Facto
     }
 }
 
-/// Returns the step between two frames for a motion model. Its noise is that of the later frame, unless that is
-/// not given or the noise is estimated.
+/// Returns the step between two frames for a motion model. Its noise is that of the later frame if that is given.
 pub fn motion_step<'a>(
     frames: [usize; 2],
     [from, to]: [&'a Frame; 2],
@@ -422,10 +421,10 @@ pub fn motion_step<'a>(
     estimates: &'a dyn Fn(&str) -> Option<Box<dyn Variable>>,
 ) -> MotionStep<'a> {
     let pose = from.world_from_camera.between(&to.world_from_camera);
-    let is_estimated = settings.variance_components.as_ref().is_some_and(|variance| variance.odometry);
     let OdometrySettings { noise, loss } = &settings.odometry;
-    let noise = to.odometry_noise.as_deref().filter(|_| !is_estimated).unwrap_or(noise);
-    let odometry = RelativePose { pose, noise, loss: loss.as_ref() };
+    let (noise, name) =
+        to.odometry_noise.as_deref().map_or((noise, None), |given| (given, Some(STEP_WITH_NOISE)));
+    let odometry = RelativePose { pose, noise, name, loss: loss.as_ref() };
     MotionStep { frames, seconds: to.timestamp - from.timestamp, odometry, estimates }
 }
 

@@ -68,6 +68,10 @@ pub struct MotionStep<'a> {
     pub estimates: &'a dyn Fn(&str) -> Option<Box<dyn Variable>>,
 }
 
+/// Name of the factor of a step whose noise its frame gives. It keeps this noise if the noise of the odometry is
+/// estimated.
+pub const STEP_WITH_NOISE: &str = "odometry with its own noise";
+
 /// A relative pose measured by odometry.
 #[derive(Debug, Clone, Copy)]
 pub struct RelativePose<'a> {
@@ -75,6 +79,8 @@ pub struct RelativePose<'a> {
     pub pose: Se3,
     /// Noise of Log(Z⁻¹ Xᵢ⁻¹ Xⱼ): rad, then m.
     pub noise: &'a Noise,
+    /// Name of its factor: [`STEP_WITH_NOISE`] if the frame gives the noise.
+    pub name: Option<&'static str>,
     /// Robust loss; `None` for a quadratic one.
     pub loss: Option<&'a Arc<dyn Loss>>,
 }

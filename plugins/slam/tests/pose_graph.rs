@@ -2,7 +2,7 @@
 use crate::online::{mapped, run_of, scene};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::{Between, Coordinates, Position, Prior, Se3};
-use manifactor_graph::{Factor, Noise};
+use manifactor_graph::{Factor, Graph, Noise};
 use manifactor_slam::estimate::Estimate;
 use manifactor_slam::online::{FrameReport, Mapper};
 use manifactor_slam::pose_graph::{PoseFactor, PoseFactorKey, PoseGraphChanges};
@@ -11,6 +11,7 @@ use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::{ObjectId, Observation, Sequence};
 use manifactor_slam::settings::RunSettings;
 use manifactor_slam::source::{format_line, parse};
+use manifactor_slam::variance::StreamNoise;
 use manifactor_solve::Silent;
 use nalgebra::{Vector3, Vector6};
 use std::collections::BTreeMap;
@@ -50,6 +51,13 @@ fn with_odometry(sequence: &Sequence, poses: &[Se3]) -> Vec<Observation> {
         observation.frame.world_from_camera = *pose;
     }
     frames
+}
+
+/// Returns the sequence with these frames.
+fn sequence_of(sequence: &Sequence, frames: Vec<Observation>) -> Sequence {
+    let mut changed = sequence.header().into_sequence();
+    frames.into_iter().for_each(|frame| changed.push(frame));
+    changed
 }
 
 fn factor(id: &str, timestamps: &[f64], factor: impl Factor + 'static, sigma: f64) -> PoseFactor {
@@ -243,9 +251,8 @@ fn a_closure_to_a_pose_outside_of_the_window_counts_in_the_final_map() {
     frames[79].pose_graph.factors.push(factor("loop", &[first, last], Between { relative }, 0.01));
     let (mapper, reports) = add_all(settings, &sequence, &frames);
     assert!(reports[79].refused[0].contains("the pose x0 has left the window"), "{:?}", reports[79].refused);
-    let mut accepted = sequence.header().into_sequence();
-    frames.into_iter().for_each(|frame| accepted.push(frame));
-    let estimate = mapper.finish(Arc::new(accepted), &mut Silent).unwrap();
+    let accepted = Arc::new(sequence_of(&sequence, frames));
+    let estimate = mapper.finish(accepted, &mut Silent).unwrap();
     let entries = estimate.mapping.graph.factors();
     assert_eq!(entries.iter().filter(|entry| entry.name.as_deref() == Some("loop")).count(), 1);
 }
@@ -262,6 +269,39 @@ fn a_step_has_the_noise_of_its_frame() {
         |to: &str| graph.factors().iter().find(|e| e.keys.len() == 2 && e.keys[1].as_str() == to).unwrap();
     assert_eq!(of_step("x3").noise, noise);
     assert_eq!(of_step("x2").noise, settings.odometry.noise);
+}
+
+#[test]
+fn a_step_with_its_own_noise_keeps_it_when_the_rest_is_estimated() {
+    let text =
+        TABLE.replace("frames = 80 }", "frames = 80 }, odometry = { rotation = 0.1, translation = 0.1 }");
+    let run = run_of(&format!("{text}variance_components = {{ prefix_s = 2.0 }}"), &[]);
+    let settings = &run.variants[0].settings;
+    let sequence = settings.source.load(&Default::default()).unwrap();
+    let noise = Noise::sigmas(&[0.1, 0.1, 0.1, 0.2, 0.2, 0.2]).unwrap();
+    let noise_of_steps = |given: &[usize]| {
+        let mut frames: Vec<Observation> = sequence.observations().collect();
+        given.iter().for_each(|i| frames[*i].frame.odometry_noise = Some(Arc::new(noise.clone())));
+        let (mut mapper, _) = add_all(settings, &sequence, &frames);
+        let estimated = StreamNoise::estimate(sequence_of(&sequence, frames.clone()), settings, &mut Silent);
+        mapper.set_noise(&estimated.unwrap().expect("there are enough objects")).unwrap();
+        let (graph, _) = mapper.smoother().graph();
+        let of_step = |graph: &Graph, to: &str| {
+            let mut steps = graph.factors().iter().filter(|e| e.keys.len() == 2 && e.keys[1].as_str() == to);
+            steps.next().unwrap().noise.clone()
+        };
+        let online = ["x3", "x4"].map(|to| of_step(&graph, to));
+        let estimate = mapper.finish(Arc::new(sequence_of(&sequence, frames)), &mut Silent).unwrap();
+        let last = ["x3", "x4"].map(|to| of_step(&estimate.mapping.graph, to));
+        (online, last, estimate.components.last().unwrap().odometry)
+    };
+    let (online, last, odometry) = noise_of_steps(&[3]);
+    assert!(online[0] == noise && last[0] == noise && odometry.is_some());
+    assert!(online[1] != noise && last[1] != noise && last[1] != settings.odometry.noise);
+    let all: Vec<usize> = (1..80).collect();
+    let (online, last, odometry) = noise_of_steps(&all);
+    assert!(online.iter().chain(&last).all(|of_step| *of_step == noise));
+    assert_eq!(odometry, None, "there is nothing to estimate");
 }
 
 /// A document of TABLE with frames from a file, and more fields of its source.

@@ -23,10 +23,10 @@ impl MotionModel for OdometryMotion {
     }
 
     fn factors(&self, step: &MotionStep<'_>) -> Result<Vec<FactorEntry>, MotionError> {
-        let RelativePose { pose, noise, loss } = step.odometry;
+        let RelativePose { pose, noise, name, loss } = step.odometry;
         Ok(vec![FactorEntry {
             keys: step.frames.map(pose_key).to_vec(),
-            name: None,
+            name: name.map(Arc::from),
             factor: Arc::new(Between { relative: pose }),
             noise: noise.clone(),
             loss: loss.cloned(),

@@ -22,8 +22,8 @@ pub struct VarianceSettings {
     /// autocorrelation time, τ such boxes carry the information of one, so their standard deviation is √τ
     /// times as large.
     pub correlation: bool,
-    /// Estimates the noise of the odometry. The given noise is used otherwise, and with fewer than four
-    /// objects.
+    /// Estimates the noise of the odometry. The given noise is used otherwise, with fewer than four
+    /// objects, and for steps whose frame gives it.
     pub odometry: bool,
     /// Models odometry errors that turn about the observed scene, and not only about the camera.
     pub pivot: bool,

@@ -5,7 +5,7 @@ use super::{FrameError, Mapper};
 use manifactor_formats::tum::StampedPose;
 use manifactor_graph::{FactorEntry, Graph, Key, Manifold, Values, Variable};
 use manifactor_mapping::mapping::{motion_step, object_key, pose_key, prior_entry};
-use manifactor_mapping::motion::MotionError;
+use manifactor_mapping::motion::{MotionError, STEP_WITH_NOISE};
 use manifactor_quadric::DualQuadric;
 use manifactor_recording::pose_graph::{PoseFactor, PoseGraphChanges, correct_frames};
 use manifactor_recording::sequence::{Frame, ObjectId};
@@ -109,9 +109,10 @@ impl Mapper {
     fn replace_odometry(&mut self, entries: Vec<FactorEntry>) -> Result<usize, ChangeError> {
         let (graph, ids) = self.smoother.graph();
         let name = |entry: &FactorEntry| (entry.keys.clone(), entry.factor.typetag_name());
-        let unnamed = graph.factors().iter().zip(ids).filter(|(entry, _)| entry.name.is_none());
+        let is_step = |entry: &FactorEntry| entry.name.as_deref().is_none_or(|name| name == STEP_WITH_NOISE);
+        let steps = graph.factors().iter().zip(ids).filter(|(entry, _)| is_step(entry));
         let by_keys: HashMap<(Vec<Key>, &str), FactorId> =
-            unnamed.map(|(entry, id)| (name(entry), id)).collect();
+            steps.map(|(entry, id)| (name(entry), id)).collect();
         let mut outside = 0;
         for entry in entries {
             match by_keys.get(&name(&entry)) {

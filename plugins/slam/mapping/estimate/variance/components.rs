@@ -165,7 +165,7 @@ pub(super) fn replace_noise(entry: &mut FactorEntry, noise: Noise) {
 }
 
 /// Returns the kind of measurement of a factor. Odometry is a factor without a name between the poses of
-/// consecutive frames.
+/// consecutive frames; a step with its own noise has a name.
 pub(super) fn measurement_of(entry: &FactorEntry) -> MeasurementOf {
     let pose = TypeId::of::<Se3>();
     let are_poses = || entry.factor.erased().signature().variables.iter().all(|variable| *variable == pose);

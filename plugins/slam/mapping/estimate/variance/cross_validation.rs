@@ -69,13 +69,13 @@ struct LeftOutObject {
 }
 
 impl<'a> CrossValidation<'a> {
-    /// Returns whether there are enough objects.
+    /// Returns whether there are enough objects, and odometry without a noise of its own.
     pub(super) fn is_possible(mapping: &Mapping) -> bool {
-        mapping.mapped().count() >= MIN_OBJECTS
+        mapping.mapped().count() >= MIN_OBJECTS && has_unknown_noise(mapping)
     }
 
-    /// Creates the folds of a map with known box noise. `values` are close to the estimate. `None` for too
-    /// few objects.
+    /// Creates the folds of a map with known box noise. `values` are close to the estimate. `None` if that is
+    /// [not possible](Self::is_possible).
     pub(super) fn new(mapping: &Mapping, values: &'a Values) -> Option<Self> {
         if !Self::is_possible(mapping) {
             return None;
@@ -113,6 +113,11 @@ impl<'a> CrossValidation<'a> {
         let gains = gains.collect::<Result<Vec<_>, _>>()?;
         Ok(gains.chunks(self.folds.len()).map(|folds| score(&folds.concat())).collect())
     }
+}
+
+/// Returns whether there is odometry whose noise is to be estimated.
+pub(super) fn has_unknown_noise(mapping: &Mapping) -> bool {
+    mapping.graph.factors().iter().any(|entry| matches!(measurement_of(entry), MeasurementOf::Motion))
 }
 
 /// Returns the sum and its standard error.

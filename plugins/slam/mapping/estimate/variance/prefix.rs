@@ -1,5 +1,6 @@
 //! The noise of a stream, estimated from its first seconds.
 use super::components::{MeasurementOf, measurement_of, replace_noise};
+use super::cross_validation::has_unknown_noise;
 use super::{BoxComponent, BoxGroups, MotionComponent, VarianceComponents, VarianceError, VarianceSettings};
 use crate::estimate::{Estimate, EstimateError};
 use crate::mapping::Mapping;
@@ -86,13 +87,13 @@ impl StreamNoise {
         // one noise for all boxes: there are too few for several
         let boxes = if variance.boxes == BoxGroups::Given { BoxGroups::Given } else { BoxGroups::All };
         let variance = VarianceSettings { rounds: MAX_ROUNDS, boxes, size: false, ..variance.clone() };
-        let wants_odometry = variance.odometry;
+        let is_odometry_estimated = variance.odometry;
         settings.variance_components = Some(variance);
         let sequence = Arc::new(first_frames);
         let mapping = Mapping::new(&sequence, &settings)?;
         let estimate = Estimate::new(sequence, mapping, &settings, observer)?;
         let Some(found) = estimate.components.last() else { return Ok(None) };
-        if wants_odometry && found.odometry.is_none() {
+        if is_odometry_estimated && found.odometry.is_none() && has_unknown_noise(&estimate.mapping) {
             return Ok(None);
         }
         let odometry = found.odometry.map(|choice| choice.smallest_noise);
