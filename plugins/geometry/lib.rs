@@ -31,7 +31,7 @@ pub use factors::{
 };
 pub use groups::{
     AngleError, Coordinates, CoordinatesError, ImuBias, LieGroup, MatrixError, Point1, Point2, Point3, Rn,
-    RotationError, Se2, Se3, So2, So3, Twist, Velocity, atan2, wrap,
+    RotationError, Se2, Se3, Sim3, So2, So3, Twist, Velocity, atan2, wrap,
 };
 pub use initialise::{Chordal, SpanningTree, Tree, spanning_tree};
-pub use procrustes::{NearestRotation, PointPairs, Similarity, nearest_rotation};
+pub use procrustes::{NearestRotation, PointPairs, nearest_rotation};

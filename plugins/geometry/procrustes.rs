@@ -1,6 +1,6 @@
 //! Orthogonal Procrustes problems: the rotation closest to a matrix, and the similarity closest to pairs of
 //! points.
-use crate::{Se3, So3};
+use crate::{Sim3, So3};
 use nalgebra::{Matrix3, Vector3};
 
 /// The rotation R that maximizes tr(Rᵀ M), and the singular values of M.
@@ -67,32 +67,6 @@ fn across(direction: &Vector3<f64>, wanted: &Vector3<f64>) -> Vector3<f64> {
     candidates.into_iter().find_map(|c| c.try_normalize(0.1)).unwrap_or_else(Vector3::z)
 }
 
-/// A change of frames that may change the scale: y = scale · R x + t.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Similarity {
-    /// Scale factor of lengths.
-    pub scale: f64,
-    /// Rotation R.
-    pub rotation: So3,
-    /// Translation t.
-    pub translation: Vector3<f64>,
-}
-
-impl Similarity {
-    /// Creates a similarity of scale 1 from a pose.
-    pub fn rigid(pose: Se3) -> Self {
-        Self { scale: 1.0, rotation: pose.rotation, translation: pose.translation }
-    }
-    /// Maps a point to the target frame.
-    pub fn act(&self, point: &Vector3<f64>) -> Vector3<f64> {
-        self.rotation.act(point) * self.scale + self.translation
-    }
-    /// Maps a pose to the target frame. Only its position is scaled.
-    pub fn act_on_pose(&self, pose: &Se3) -> Se3 {
-        Se3::new(self.rotation.compose(&pose.rotation), self.act(&pose.translation))
-    }
-}
-
 /// Sums over pairs of points (x, y), from which the similarity is computed that minimizes the mean squared
 /// distance (Umeyama, Least-Squares Estimation of Transformation Parameters Between Two Point Patterns,
 /// 1991).
@@ -131,16 +105,16 @@ impl PointPairs {
 
     /// Returns the closest rotation and translation. `None` if the ratio of the second to the first singular
     /// value is at most `flat`: the points are on a line, and the rotation about it is arbitrary.
-    pub fn rigid(&self, flat: f64) -> Option<Similarity> {
+    pub fn rigid(&self, flat: f64) -> Option<Sim3> {
         self.closest(flat, |_| 1.0)
     }
 
     /// Returns the closest rotation, translation and scale, with the condition of [`rigid`](Self::rigid).
-    pub fn similarity(&self, flat: f64) -> Option<Similarity> {
+    pub fn similarity(&self, flat: f64) -> Option<Sim3> {
         self.closest(flat, |singular_values| singular_values.iter().sum::<f64>() / self.spread)
     }
 
-    fn closest(&self, flat: f64, scale: impl Fn([f64; 3]) -> f64) -> Option<Similarity> {
+    fn closest(&self, flat: f64, scale: impl Fn([f64; 3]) -> f64) -> Option<Sim3> {
         let NearestRotation { rotation, singular_values } = nearest_rotation(&self.products);
         // A comparison that is false for NaN, which occurs without pairs.
         let is_determined = singular_values[1] > flat * singular_values[0];
@@ -149,7 +123,7 @@ impl PointPairs {
         }
         let scale = scale(singular_values);
         let translation = self.means[1] - rotation.act(&self.means[0]) * scale;
-        Some(Similarity { scale, rotation, translation })
+        Some(Sim3 { scale, rotation, translation })
     }
 }
 
@@ -193,7 +167,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_similarity_is_found_again(rotation in any_so3(), translation in vector::<3>(3.0), scale in 0.1..10.0, seed in prop::collection::vec((vector::<3>(1.0), 0.1..3.0), 1..6)) {
-            let truth = Similarity { scale, rotation, translation };
+            let truth = Sim3 { scale, rotation, translation };
             // Corners keep the points apart: rounding decides about points that almost coincide.
             let corners = [Vector3::zeros(), Vector3::x(), Vector3::y()].map(|x| (x, 1.0));
             let points = corners.into_iter().chain(seed);

@@ -1,8 +1,8 @@
 //! Strategies for rotations, poses and points, including the cases that tend to break formulas.
-use crate::{BalCamera, CameraModel, ImuBias, Point2, Point3, Rn, Se2, Se3, So2, So3, Twist, Velocity};
+use crate::{BalCamera, CameraModel, ImuBias, Point2, Point3, Rn, Se2, Se3, Sim3, So2, So3, Twist, Velocity};
 use manifactor_testing::register_points;
 use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
-use nalgebra::{Vector1, Vector2, Vector3, Vector6};
+use nalgebra::{SVector, Vector1, Vector2, Vector3, Vector6};
 use proptest::prelude::*;
 use std::f64::consts::PI;
 
@@ -14,6 +14,11 @@ register_points!(So2, any_so2(), [So2::identity(), So2::exp(PI)]);
 register_points!(So3, any_so3(), [So3::identity(), half_a_turn()]);
 register_points!(Se2, any_se2(), [Se2::identity(), Se2::new(So2::exp(PI), Vector2::zeros())]);
 register_points!(Se3, any_se3(), [Se3::identity(), Se3::new(half_a_turn(), Vector3::zeros())]);
+register_points!(
+    Sim3,
+    any_sim3(),
+    [Sim3::identity(), Sim3::rigid(Se3::new(half_a_turn(), Vector3::zeros()))]
+);
 register_points!(Rn<1>, any_point::<1>(), [Rn::<1>(Vector1::zeros())]);
 register_points!(Point2, any_point2(), [Rn::<2>(Vector2::zeros())]);
 register_points!(Point3, any_point3(), [Rn::<3>(Vector3::zeros())]);
@@ -75,6 +80,16 @@ pub fn any_se3() -> impl Strategy<Value = Se3> + Clone {
     (any_so3(), vector::<3>(SIZE)).prop_map(|(r, t)| Se3::new(r, t))
 }
 
+/// Poses in space with a scale from 0.1 to 10, often close to 1.
+pub fn any_sim3() -> impl Strategy<Value = Sim3> + Clone {
+    (any_se3(), log_scale()).prop_map(|(x, log)| Sim3::new(x.rotation, x.translation, log.exp()))
+}
+
+/// Logarithms of scales from 0.1 to 10, often close to zero.
+fn log_scale() -> impl Strategy<Value = f64> + Clone {
+    prop_oneof![1 => Just(0.0), 1 => -1e-6..1e-6f64, 1 => -0.2..0.2f64, 2 => -2.3..2.3f64]
+}
+
 /// Cameras of bundle adjustment, with some distortion.
 pub fn any_bal_camera() -> impl Strategy<Value = BalCamera> + Clone {
     let distortion = vector::<2>(0.1);
@@ -123,4 +138,9 @@ pub fn se2_tangent() -> impl Strategy<Value = Vector3<f64>> + Clone {
 /// Tangent vectors of SE(3) inside its chart.
 pub fn se3_tangent() -> impl Strategy<Value = Vector6<f64>> + Clone {
     (rotation_vector(), vector::<3>(SIZE)).prop_map(|(w, v)| Vector6::new(w.x, w.y, w.z, v.x, v.y, v.z))
+}
+
+/// Tangent vectors of Sim(3) inside its chart.
+pub fn sim3_tangent() -> impl Strategy<Value = SVector<f64, 7>> + Clone {
+    (se3_tangent(), log_scale()).prop_map(|(xi, log)| xi.push(log))
 }

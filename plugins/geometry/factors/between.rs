@@ -2,7 +2,7 @@
 //!
 //! The logarithm jumps if measurement and estimate differ by a rotation of π.
 use crate::groups::LieGroup;
-use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3};
+use crate::{Point1, Point2, Point3, Se2, Se3, Sim3, So2, So3};
 use manifactor_graph::prelude::*;
 
 /// A measurement of the second variable in the frame of the first: `relative`.
@@ -56,6 +56,7 @@ register_factor!("between_so2", Between<So2>);
 register_factor!("between_so3", Between<So3>);
 register_factor!("between_se2", Between<Se2>);
 register_factor!("between_se3", Between<Se3>);
+register_factor!("between_sim3", Between<Sim3>);
 register_factor!("between_point1", Between<Point1>);
 register_factor!("between_point2", Between<Point2>);
 register_factor!("between_point3", Between<Point3>);
@@ -83,6 +84,7 @@ mod tests {
         jacobians_agree_on_so3: cases!(any_so3(), rotation_vector());
         jacobians_agree_on_se2: cases!(any_se2(), se2_tangent());
         jacobians_agree_on_se3: cases!(any_se3(), se3_tangent());
+        jacobians_agree_on_sim3: cases!(any_sim3(), sim3_tangent());
         jacobians_agree_on_point1: shifted::<1>();
         jacobians_agree_on_point2: shifted::<2>();
         jacobians_agree_on_point3: shifted::<3>();

@@ -2,7 +2,7 @@
 //!
 //! The logarithm jumps if X differs from Z by a rotation of π.
 use crate::groups::LieGroup;
-use crate::{ImuBias, Point1, Point2, Point3, Se2, Se3, So2, So3, Twist, Velocity};
+use crate::{ImuBias, Point1, Point2, Point3, Se2, Se3, Sim3, So2, So3, Twist, Velocity};
 use manifactor_graph::prelude::*;
 
 /// A prior: the variable is close to `value`.
@@ -51,6 +51,7 @@ register_factor!("prior_so2", Prior<So2>);
 register_factor!("prior_so3", Prior<So3>);
 register_factor!("prior_se2", Prior<Se2>);
 register_factor!("prior_se3", Prior<Se3>);
+register_factor!("prior_sim3", Prior<Sim3>);
 register_factor!("prior_point1", Prior<Point1>);
 register_factor!("prior_point2", Prior<Point2>);
 register_factor!("prior_point3", Prior<Point3>);
@@ -62,8 +63,8 @@ register_factor!("prior_imu_bias", Prior<ImuBias>);
 mod tests {
     use super::*;
     use crate::testing::{
-        any_imu_bias, any_point, any_se2, any_se3, any_so2, any_so3, any_twist, any_velocity, se2_tangent,
-        se3_tangent,
+        any_imu_bias, any_point, any_se2, any_se3, any_sim3, any_so2, any_so3, any_twist, any_velocity,
+        se2_tangent, se3_tangent, sim3_tangent,
     };
     use manifactor_graph::Manifold;
     use manifactor_testing::{jacobian_laws, strategies::rotation_vector};
@@ -76,6 +77,7 @@ mod tests {
         jacobians_agree_on_so3: (any_so3(), rotation_vector()).prop_map(|(value, d)| (Prior { value }, value.retract(&d)));
         jacobians_agree_on_se2: (any_se2(), se2_tangent()).prop_map(|(value, d)| (Prior { value }, value.retract(&d)));
         jacobians_agree_on_se3: (any_se3(), se3_tangent()).prop_map(|(value, d)| (Prior { value }, value.retract(&d)));
+        jacobians_agree_on_sim3: (any_sim3(), sim3_tangent()).prop_map(|(value, d)| (Prior { value }, value.retract(&d)));
         jacobians_agree_on_point1: (any_point::<1>(), any_point::<1>()).prop_map(|(value, x)| (Prior { value }, x));
         jacobians_agree_on_point2: (any_point::<2>(), any_point::<2>()).prop_map(|(value, x)| (Prior { value }, x));
         jacobians_agree_on_point3: (any_point::<3>(), any_point::<3>()).prop_map(|(value, x)| (Prior { value }, x));

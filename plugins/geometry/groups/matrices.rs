@@ -1,5 +1,5 @@
 //! Rotations and poses from matrices, which are checked.
-use crate::{Se2, Se3, So2, So3};
+use crate::{Se2, Se3, Sim3, So2, So3};
 use nalgebra::{Matrix2, Matrix3, Matrix4, SMatrix};
 
 /// Largest entry of RᵀR - 1 in a rotation matrix R. Unit quaternions have the same tolerance. Matrices in
@@ -30,6 +30,12 @@ pub enum MatrixError {
     #[error("expected a rotation, of determinant 1, got a reflection, of determinant {determinant:.6}")]
     Reflection {
         /// The determinant, close to -1.
+        determinant: f64,
+    },
+    /// The matrix is not a rotation times a positive scale.
+    #[error("expected a rotation times a positive scale, got a matrix of determinant {determinant:.6}")]
+    NotSimilar {
+        /// The determinant, zero or negative.
         determinant: f64,
     },
     /// The last row of a homogeneous matrix is not (0, …, 0, 1).
@@ -114,14 +120,39 @@ impl Se3 {
     }
 }
 
+impl Sim3 {
+    /// Creates the similarity from the homogeneous matrix [sR t; 0 1]. The scale s is the cube root of the
+    /// determinant.
+    ///
+    /// # Errors
+    /// If sR is not a rotation times a positive number, or if the last row is not (0, 0, 0, 1).
+    pub fn try_from_matrix(matrix: &Matrix4<f64>) -> Result<Self, MatrixError> {
+        check_finite(matrix)?;
+        check_last_row(matrix)?;
+        let scaled = matrix.fixed_view::<3, 3>(0, 0).clone_owned();
+        let determinant = scaled.determinant();
+        if determinant <= 0.0 {
+            return Err(MatrixError::NotSimilar { determinant });
+        }
+        let scale = determinant.cbrt();
+        let rotation = So3::try_from_matrix(&(scaled / scale))?;
+        Ok(Self::new(rotation, matrix.fixed_view::<3, 1>(0, 3).clone_owned(), scale))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{any_se2, any_se3};
+    use crate::testing::{any_se2, any_se3, any_sim3};
     use manifactor_graph::Manifold;
     use proptest::prelude::*;
 
     proptest! {
+        #[test]
+        fn a_matrix_gives_its_similarity_back(x in any_sim3()) {
+            prop_assert!(x.local(&Sim3::try_from_matrix(&x.matrix()).unwrap()).norm() < 1e-9);
+        }
+
         #[test]
         fn a_matrix_gives_its_pose_back(x in any_se3(), y in any_se2()) {
             let again = Se3::try_from_matrix(&x.matrix()).unwrap();

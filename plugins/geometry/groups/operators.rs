@@ -1,5 +1,5 @@
 //! Operators and text: `a * b` composes, `a * v` acts on a vector, and `Display` writes poses.
-use crate::{Se2, Se3, So2, So3};
+use crate::{Se2, Se3, Sim3, So2, So3};
 use manifactor_graph::Scalar;
 use nalgebra::{Vector2, Vector3};
 use std::fmt::{self, Display, Formatter};
@@ -24,7 +24,7 @@ macro_rules! operators {
         }
     )+};
 }
-operators!(So2 on Vector2, Se2 on Vector2, So3 on Vector3, Se3 on Vector3);
+operators!(So2 on Vector2, Se2 on Vector2, So3 on Vector3, Se3 on Vector3, Sim3 on Vector3);
 
 /// Writes `(1.000, -2.000)` with the format's number of decimals, or three.
 fn list(f: &mut Formatter<'_>, numbers: &[f64]) -> fmt::Result {
@@ -71,6 +71,15 @@ impl Display for Se3 {
         list(f, self.translation.as_slice())?;
         f.write_str(" m, ")?;
         self.rotation.fmt(f)
+    }
+}
+
+/// Writes `(1.000, 0.000, 0.500) m, 90.000° about (0.000, 0.000, 1.000), scale 1.200`.
+impl Display for Sim3 {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        self.pose().fmt(f)?;
+        let decimals = f.precision().unwrap_or(3);
+        write!(f, ", scale {:.decimals$}", self.scale)
     }
 }
 

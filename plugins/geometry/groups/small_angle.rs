@@ -40,6 +40,53 @@ pub(crate) fn exponential<T: Scalar>(theta2: T) -> Exponential<T> {
     Exponential { cos_half, sin_half, a: sin_half * sin_half * 2.0, b }
 }
 
+/// Coefficients of W = ∫ e^{λs} Exp(sω) ds = A + B ω^ + C (ω^)² for s from 0 to 1, and of its inverse.
+pub(crate) struct ScaledIntegral<T> {
+    /// A, B, C.
+    pub(crate) forward: [T; 3],
+    /// Those of W⁻¹.
+    pub(crate) inverse: [T; 3],
+}
+
+/// Terms of the power series below the limit: they omit less than 1e-16.
+const SCALED_TERMS: i32 = 10;
+
+/// Returns the coefficients for θ² and λ. With z = λ + iθ, W turns a vector in the plane of rotation by the factor
+/// (e^z - 1)/z, and scales the axis by (e^λ - 1)/λ.
+pub(crate) fn scaled_integral<T: Scalar>(theta2: T, lambda: T) -> ScaledIntegral<T> {
+    let size = theta2 + lambda * lambda;
+    let of_axis = |lambda: T| {
+        if lambda * lambda < T::from(SERIES_LIMIT) {
+            (2..=SCALED_TERMS).rev().fold(T::one(), |sum, n| sum * lambda / f64::from(n) + T::one())
+        } else {
+            lambda.exp_m1() / lambda
+        }
+    };
+    let a = of_axis(lambda);
+    let (b, c) = if size < T::from(SERIES_LIMIT) {
+        // z^n = p + iθq and λ^n = p + θ²d, each divided by (n + 1)!
+        let (mut p, mut q, mut d) = (T::one(), T::zero(), T::zero());
+        let (mut b, mut c) = (T::zero(), T::zero());
+        for n in 1..=SCALED_TERMS {
+            (p, q, d) = (p * lambda - theta2 * q, p + q * lambda, d * lambda + q);
+            let factor = 1.0 / f64::from(n + 1);
+            (p, q, d) = (p * factor, q * factor, d * factor);
+            b += q;
+            c += d;
+        }
+        (b, c)
+    } else {
+        let e = exponential(theta2);
+        let (sin, cos) = (e.sin_half * e.cos_half * 2.0, T::one() - theta2 * e.a);
+        let growth = lambda.exp();
+        let over = |numerator: T| numerator / size;
+        (over(growth * (lambda * sin - cos) + T::one()), over(growth * (lambda * e.a - sin) + a))
+    };
+    let p = a - theta2 * c;
+    let norm2 = p * p + theta2 * b * b;
+    ScaledIntegral { forward: [a, b, c], inverse: [a.recip(), -b / norm2, (b * b - p * c) / (a * norm2)] }
+}
+
 /// Returns (1/2 - (1 - cos θ) / θ²) / θ², with `a` from [`exponential`].
 pub(crate) fn second_integral<T: Scalar>(theta2: T, a: T) -> T {
     if theta2 < T::from(SERIES_LIMIT) {
@@ -90,7 +137,62 @@ mod tests {
     }
 
     #[test]
+    fn scaled_integrals_are_those_of_a_quadrature() {
+        // composite Simpson's rule
+        let integral = |f: &dyn Fn(f64) -> f64| -> f64 {
+            let n = 2000;
+            let weight = |i: usize| if i == 0 || i == n { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };
+            (0..=n).map(|i| weight(i) * f(i as f64 / n as f64)).sum::<f64>() / (3 * n) as f64
+        };
+        for theta in [1e-9, 1e-3, 0.0999, 0.1001, 1.0, 3.1] {
+            for lambda in [-4.0, -0.1001, -0.0999, -1e-9, 0.0, 1e-4, 0.05, 0.2, 3.0] {
+                let w = scaled_integral(theta * theta, lambda);
+                let exp = |s: f64| f64::exp(lambda * s);
+                let sinc = |s: f64| {
+                    if theta * s < 1e-3 {
+                        s - theta * theta * s.powi(3) / 6.0
+                    } else {
+                        (theta * s).sin() / theta
+                    }
+                };
+                let versine = |s: f64| 2.0 * ((theta * s / 2.0).sin() / theta).powi(2);
+                let expected =
+                    [integral(&exp), integral(&|s| exp(s) * sinc(s)), integral(&|s| exp(s) * versine(s))];
+                for (x, expected) in w.forward.iter().zip(expected) {
+                    assert!(
+                        (x - expected).abs() < 1e-9 * expected.abs().max(1.0),
+                        "{theta} {lambda}: {x} {expected}"
+                    );
+                }
+                // (A + Bi θ - Cθ²) is the factor in the plane
+                let [factor, inverse] =
+                    [w.forward, w.inverse].map(|[a, b, c]| (a - c * theta * theta, b * theta));
+                let one = (
+                    factor.0 * inverse.0 - factor.1 * inverse.1,
+                    factor.0 * inverse.1 + factor.1 * inverse.0,
+                );
+                assert!((one.0 - 1.0).abs() < 1e-12 && one.1.abs() < 1e-12, "{theta} {lambda}: {one:?}");
+                assert!((w.forward[0] * w.inverse[0] - 1.0).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn scaled_integrals_meet_at_the_switch() {
+        for turn in [0.0, 0.5, 1.0, 1.5] {
+            let at = |size: f64| scaled_integral((f64::sin(turn) * size).powi(2), f64::cos(turn) * size);
+            let [below, above] = [at(0.1 * (1.0 - 1e-12)), at(0.1 * (1.0 + 1e-12))];
+            for (x, y) in
+                below.forward.iter().chain(&below.inverse).zip(above.forward.iter().chain(&above.inverse))
+            {
+                assert!((x - y).abs() < 3e-13, "{turn}: {x} {y}");
+            }
+        }
+    }
+
+    #[test]
     fn values_at_zero_are_the_limits() {
+        assert_eq!(scaled_integral(0.0, 0.0).forward, [1.0, 0.5, 1.0 / 6.0]);
         let x = exponential(0.0);
         assert_eq!((x.cos_half, x.sin_half, x.a, x.b), (1.0, 0.5, 0.5, 1.0 / 6.0));
         assert_eq!(second_integral(0.0, 0.5), 1.0 / 24.0);

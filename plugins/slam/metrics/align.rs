@@ -1,6 +1,6 @@
 //! Alignment of an estimate with the ground truth.
 use super::{MetricsError, PosePair};
-use manifactor_geometry::{PointPairs, Se3, Similarity};
+use manifactor_geometry::{PointPairs, Se3, Sim3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -28,13 +28,13 @@ impl Alignment {
 ///
 /// # Errors
 /// If there is no pair, or if the alignment fits positions and they lie on one line.
-pub fn align(pairs: &[PosePair], kind: Alignment) -> Result<(Similarity, Vec<PosePair>), MetricsError> {
+pub fn align(pairs: &[PosePair], kind: Alignment) -> Result<(Sim3, Vec<PosePair>), MetricsError> {
     let too_few = MetricsError::TooFew { what: "alignment", needed: 1, found: 0 };
     let first = pairs.first().ok_or(too_few)?;
     let points = PointPairs::new(pairs.iter().map(|p| (p.estimate.translation, p.truth.translation, 1.0)));
     let similarity = match kind {
-        Alignment::None => Similarity::rigid(Se3::identity()),
-        Alignment::FirstPose => Similarity::rigid(first.truth.compose(&first.estimate.inverse())),
+        Alignment::None => Sim3::rigid(Se3::identity()),
+        Alignment::FirstPose => Sim3::rigid(first.truth.compose(&first.estimate.inverse())),
         Alignment::Se3 => points.rigid(COLLINEAR_RATIO).ok_or(MetricsError::Degenerate)?,
         Alignment::Sim3 => points.similarity(COLLINEAR_RATIO).ok_or(MetricsError::Degenerate)?,
     };

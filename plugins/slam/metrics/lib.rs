@@ -19,7 +19,7 @@ pub use bootstrap::{Interval, bootstrap, change_of_error};
 pub use error::relative_errors;
 pub use error::{Pairing, RelativeError, absolute_error, relative_error};
 pub use identity::{IdentityScores, identity};
-pub use manifactor_geometry::Similarity;
+pub use manifactor_geometry::Sim3;
 pub use pairing::pair_boxes;
 pub use statistics::Statistics;
 

@@ -2,12 +2,12 @@
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_mapping::estimate::Estimate;
-use manifactor_metrics::{Alignment, Similarity, align, associate};
+use manifactor_metrics::{Alignment, Sim3, align, associate};
 
 /// Transformations from the map frame to the frame of the record.
 pub(super) struct RecordFrames {
-    pub(super) odometry: Similarity,
-    pub(super) estimate: Similarity,
+    pub(super) odometry: Sim3,
+    pub(super) estimate: Sim3,
 }
 
 impl RecordFrames {
@@ -18,13 +18,13 @@ impl RecordFrames {
     pub(super) fn of(estimate: &Estimate, max_time_difference: f64) -> Self {
         let truth = estimate.sequence.ground_truth.as_ref();
         let to_truth = |poses: &[StampedPose]| match truth {
-            None => Similarity::rigid(Se3::identity()),
+            None => Sim3::rigid(Se3::identity()),
             Some(truth) if !truth.objects.is_empty() => {
-                Similarity::rigid(estimate.mapping.frame.map_from_odometry.inverse())
+                Sim3::rigid(estimate.mapping.frame.map_from_odometry.inverse())
             }
             Some(truth) => associate(&truth.trajectory, poses, max_time_difference)
                 .and_then(|pairs| align(&pairs, Alignment::Se3))
-                .map_or_else(|_| Similarity::rigid(Se3::identity()), |(similarity, _)| similarity),
+                .map_or_else(|_| Sim3::rigid(Se3::identity()), |(similarity, _)| similarity),
         };
         Self { odometry: to_truth(&estimate.odometry()), estimate: to_truth(&estimate.trajectory()) }
     }

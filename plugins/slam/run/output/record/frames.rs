@@ -5,7 +5,7 @@ use manifactor_geometry::Se3;
 use manifactor_mapping::estimate::Estimate;
 use manifactor_mapping::mapping::pose_key;
 use manifactor_mapping::settings::EvaluationSettings;
-use manifactor_metrics::{Alignment, Pairing, PosePair, Similarity, align, associate, relative_errors};
+use manifactor_metrics::{Alignment, Pairing, PosePair, Sim3, align, associate, relative_errors};
 use manifactor_quadric::{BoundingBox, Camera, DualQuadric, Ellipsoid};
 use manifactor_recording::sequence::ObjectId;
 use serde::{Deserialize, Serialize};
@@ -127,7 +127,7 @@ impl PoseErrors {
         })
     }
 
-    fn tracked(&self, stamped: &StampedPose, drawn: &Similarity) -> PoseRecord {
+    fn tracked(&self, stamped: &StampedPose, drawn: &Sim3) -> PoseRecord {
         PoseRecord {
             pose: drawn.act_on_pose(&stamped.pose),
             error: entry_at(&self.absolute, stamped.timestamp),

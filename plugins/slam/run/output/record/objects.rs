@@ -5,7 +5,7 @@ use crate::output::report::object_errors;
 use manifactor_geometry::Se3;
 use manifactor_mapping::estimate::Estimate;
 use manifactor_mapping::mapping::{MappedObject, Rejection};
-use manifactor_metrics::Similarity;
+use manifactor_metrics::Sim3;
 use manifactor_quadric::{DualQuadric, LandmarkError};
 use manifactor_recording::sequence::{ObjectId, TrueObject};
 use serde::{Deserialize, Serialize};
@@ -107,7 +107,7 @@ fn never_detected(truth: &TrueObject) -> ObjectRecord {
     }
 }
 
-fn moved(quadric: &DualQuadric, frame: &Similarity) -> DualQuadric {
+fn moved(quadric: &DualQuadric, frame: &Sim3) -> DualQuadric {
     DualQuadric { pose: frame.act_on_pose(&quadric.pose), semi_axes: quadric.semi_axes * frame.scale }
 }
 
