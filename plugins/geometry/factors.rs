@@ -10,6 +10,7 @@ mod on_body;
 mod position;
 mod prior;
 mod range;
+mod scaled_between;
 
 pub use bearing_range::BearingRange2;
 pub use bearing_range_3d::BearingRange3;
@@ -22,3 +23,4 @@ pub use on_body::{OnBody, OnBodyError};
 pub use position::Position;
 pub use prior::Prior;
 pub use range::Range;
+pub use scaled_between::ScaledBetween;

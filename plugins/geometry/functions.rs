@@ -1,5 +1,5 @@
 //! Functions of rotations, poses and points for formulas.
-use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3, atan2, wrap};
+use crate::{Point1, Point2, Point3, Se2, Se3, Sim3, So2, So3, atan2, wrap};
 use manifactor_graph::{register_functions, register_quantity};
 use nalgebra::{Vector2, Vector3, Vector6};
 
@@ -10,6 +10,7 @@ register_quantity!(So2);
 register_quantity!(So3);
 register_quantity!(Se2);
 register_quantity!(Se3);
+register_quantity!(Sim3);
 
 register_functions! {
     /// The position of a pose.
@@ -20,6 +21,27 @@ register_functions! {
 
     /// The rotation of a pose.
     fn rotation(x: Se3) -> So3 { x.rotation }
+
+    /// The position of a pose with a scale.
+    fn position(x: Sim3) -> Vector3<f64> { x.translation }
+
+    /// The rotation of a pose with a scale.
+    fn rotation(x: Sim3) -> So3 { x.rotation }
+
+    /// The scale: the length in the outer frame of a unit of the local one.
+    fn scale(x: Sim3) -> f64 { x.scale }
+
+    /// The pose y, given in the frame of x and with its scale, in the outer frame.
+    "*" fn compose(x: Sim3, y: Sim3) -> Sim3 { x.compose(&y) }
+
+    /// The point p, given in the frame of x and with its scale, in the outer frame: s R p + t.
+    "*" fn act(x: Sim3, p: Vector3<f64>) -> Vector3<f64> { x.act(&p) }
+
+    /// The inverse: `inverse(x) * p` is the point p in the frame of x.
+    fn inverse(x: Sim3) -> Sim3 { x.inverse() }
+
+    /// The pose y in the frame of x: x⁻¹y.
+    fn between(x: Sim3, y: Sim3) -> Sim3 { x.between(&y) }
 
     /// The rotation of a pose.
     fn rotation(x: Se2) -> So2 { x.rotation }

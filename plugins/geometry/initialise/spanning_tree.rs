@@ -6,7 +6,7 @@
 use super::{as_factor, seen_point};
 use crate::groups::LieGroup;
 use crate::{Between, Prior};
-use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3};
+use crate::{Point1, Point2, Point3, Se2, Se3, Sim3, So2, So3};
 use manifactor_graph::{Factor, Graph, Key, ValueError, Values, Variable};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -39,6 +39,7 @@ pub fn spanning_tree(graph: &Graph, values: &Values, tree: Tree) -> Result<Value
     grow::<So3>(graph, &mut values, tree)?;
     grow::<Se2>(graph, &mut values, tree)?;
     grow::<Se3>(graph, &mut values, tree)?;
+    grow::<Sim3>(graph, &mut values, tree)?;
     grow::<Point1>(graph, &mut values, tree)?;
     grow::<Point2>(graph, &mut values, tree)?;
     grow::<Point3>(graph, &mut values, tree)?;

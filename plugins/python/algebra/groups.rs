@@ -2,7 +2,7 @@
 use super::array::{Points, into_python};
 use crate::errors::{self, Mistake};
 use crate::input::{array, numbers, to_array};
-use manifactor::geometry::{LieGroup, MatrixError, Se2, Se3, So2, So3};
+use manifactor::geometry::{LieGroup, MatrixError, Se2, Se3, Sim3, So2, So3};
 use manifactor::graph::Variable;
 use manifactor::graph::quantity::Quantity;
 use manifactor::nalgebra::SMatrix;
@@ -48,11 +48,12 @@ macro_rules! group {
 }
 
 /// A product with the identity is normalized again. The cosine and the sine follow from the angle.
-static GROUPS: [Group; 4] = [
+static GROUPS: [Group; 5] = [
     group!(So2, 2, |x| So2::exp(x.angle())),
     group!(So3, 3, |x| LieGroup::compose(&So3::identity(), &x)),
     group!(Se2, 3, |x| Se2::new(So2::exp(x.rotation.angle()), x.translation)),
     group!(Se3, 4, |x| LieGroup::compose(&Se3::identity(), &x)),
+    group!(Sim3, 4, |x| LieGroup::compose(&Sim3::identity(), &x)),
 ];
 
 /// Returns the group of a type; `None` for a type that is none.
@@ -113,6 +114,9 @@ fn remedy(error: &MatrixError) -> &'static str {
         MatrixError::Reflection { .. } => "negate one axis: the axes have to be right-handed",
         MatrixError::LastRow { .. } => {
             "the translation is the last column; transpose a matrix of row vectors"
+        }
+        MatrixError::NotSimilar { .. } => {
+            "the determinant is the cube of the scale; if it is negative, negate one axis"
         }
         _ => "leave such entries out",
     }

@@ -10,10 +10,12 @@ use std::sync::Arc;
 
 mod constant_velocity;
 mod odometry;
+mod scaled_odometry;
 
 pub use constant_velocity::ConstantVelocityMotion;
 pub use manifactor_recording::keys::pose_key;
 pub use odometry::OdometryMotion;
+pub use scaled_odometry::ScaledOdometryMotion;
 
 /// A model of the motion between consecutive frames. Chosen by name in `[motion]` of a run.
 #[typetag::serialize(tag = "type")]
@@ -35,6 +37,11 @@ pub trait MotionModel: Debug + Send + Sync {
 
     /// Returns the prefixes of the keys of [its variables](Self::variables): `v` for `v0`, `v1`, …
     fn prefixes(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Returns the types of its variables that later frames share, so that they stay in the window of a stream.
+    fn lasting_types(&self) -> &'static [&'static str] {
         &[]
     }
 }

@@ -137,7 +137,8 @@ impl Mapper {
         if let Some(window) = &mut online.window {
             // only poses leave the window
             let own = settings.own.values.iter().map(|(_, value)| value.typetag_name());
-            let kept = own.chain([manifold_name(TypeId::of::<DualQuadric>())]);
+            let of_motion = settings.motion.lasting_types().iter().copied();
+            let kept = own.chain([manifold_name(TypeId::of::<DualQuadric>())]).chain(of_motion);
             window.keep.extend(kept.filter_map(|name| TypeName::new(name).ok()));
         }
         let trusted = settings.prior_map.as_ref().filter(|prior| prior.start.is_some());
