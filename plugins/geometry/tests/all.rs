@@ -10,3 +10,4 @@
 mod auto;
 mod catalogue;
 mod linear_solvers;
+mod scale;

@@ -16,9 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifactor.variables import BY_TYPE
 
-GROUPS: list[type[Any]] = [mf.So2, mf.So3, mf.Se2, mf.Se3]
+GROUPS: list[type[Any]] = [mf.So2, mf.So3, mf.Se2, mf.Se3, mf.Sim3]
 #: Dimension of the space that a group acts on.
-SPACE = {mf.So2: 2, mf.So3: 3, mf.Se2: 2, mf.Se3: 3}
+SPACE = {mf.So2: 2, mf.So3: 3, mf.Se2: 2, mf.Se3: 3, mf.Sim3: 3}
 ANGLE = st.floats(-3.0, 3.0)
 METRES = st.floats(-100.0, 100.0)
 
@@ -26,8 +26,8 @@ METRES = st.floats(-100.0, 100.0)
 @st.composite
 def tangents(draw: st.DrawFn, of: type[Any]) -> np.ndarray:
     """Tangent vectors with rotations of less than half a turn."""
-    xi = np.array([draw(ANGLE if name[0] in "rt" else METRES) for name in of.TANGENT])
-    turn = xi[:3] if of in (mf.So3, mf.Se3) else xi[:0]
+    xi = np.array([draw(ANGLE if name[0] in "rtl" else METRES) for name in of.TANGENT])
+    turn = xi[:3] if of in (mf.So3, mf.Se3, mf.Sim3) else xi[:0]
     turn *= min(1.0, 3.0 / max(float(np.linalg.norm(turn)), 1e-300))
     return xi
 

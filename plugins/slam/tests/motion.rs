@@ -1,10 +1,14 @@
 //! Motion models, in batch and in a stream.
 use crate::online::{both, run_of};
-use manifactor_geometry::Twist;
+use manifactor_geometry::{Point1, Twist};
+use manifactor_slam::estimate::Estimate;
 use manifactor_slam::mapping::Mapping;
 use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
-use manifactor_solve::Silent;
+use manifactor_slam::sequence::{Frame, Observation};
+use manifactor_solve::{Problem, Silent};
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A camera that moves around a desk with poor odometry. Only depths determine the scale; velocities and
 /// boxes do not.
@@ -53,4 +57,76 @@ fn what_does_not_go_with_a_motion_model_is_refused() {
     assert!(own.contains("`v3` is the key of a variable of the motion model `constant_velocity`"), "{own}");
     let variance = refused("[variance_components]\nodometry = true");
     assert!(variance.contains("has no odometry whose noise could be estimated"), "{variance}");
+}
+
+/// A camera without depth that walks around a table with objects of known classes.
+const MONOCULAR: &str = r#"
+semantics = "table_one"
+sizes = "household"
+motion = { type = "scaled_odometry" }
+source = { type = "simulated", scene = { objects = 12 }, trajectory = { frames = 80 }, odometry = { translation = 0.02, rotation = 0.02 } }
+odometry = { noise = { sigma = 0.002 } }
+"#;
+
+/// The estimated logarithm of a scale.
+#[derive(Debug)]
+struct FoundScale {
+    error: f64,
+    sigma: f64,
+}
+
+/// Returns the estimated scales at the first and at the last step. `log_unit` is the logarithm of the length of one
+/// unit of the odometry, in metres, at a share of the trajectory.
+fn found_scales(text: &str, scene: usize, log_unit: fn(f64) -> f64) -> [FoundScale; 2] {
+    let run = run_of(text, &[&format!("source.scene.seed={scene}")]);
+    let settings = run.variants[0].settings.clone().for_stream();
+    let sequence = settings.source.load(&Default::default()).unwrap();
+    let frames: Vec<Observation> = sequence.observations().collect();
+    let share = |i: usize| i as f64 / (frames.len() - 2) as f64;
+    let mut monocular = sequence.header().into_sequence();
+    let mut pose = frames[0].frame.world_from_camera;
+    for (i, observation) in frames.iter().enumerate() {
+        if let Some(before) = i.checked_sub(1) {
+            let mut step =
+                frames[before].frame.world_from_camera.between(&observation.frame.world_from_camera);
+            step.translation /= log_unit(share(before)).exp();
+            pose = pose.compose(&step);
+        }
+        let frame = Frame { world_from_camera: pose, ..observation.frame.clone() };
+        monocular.push(Observation { frame, ..observation.clone() });
+    }
+    let sequence = Arc::new(monocular);
+    let mapping = Mapping::new(&sequence, &settings).unwrap();
+    let estimate = Estimate::new(sequence, mapping, &settings, &mut Silent).unwrap();
+    assert!(estimate.solution.outcome.termination.is_converged());
+    let mut problem = Problem::compile(&estimate.mapping.graph, &estimate.solution.values).unwrap();
+    problem.linearize();
+    let sigmas: BTreeMap<String, f64> = problem
+        .marginals()
+        .unwrap()
+        .into_iter()
+        .map(|(key, m)| (key.to_string(), m[(0, 0)].sqrt()))
+        .collect();
+    let steps = frames.len() - 1;
+    [0, steps - 1].map(|step| {
+        let key = if text.contains("drift") { format!("s{step}") } else { "s0".to_owned() };
+        let scale = estimate.solution.values.get::<Point1>(key.as_str()).unwrap().0.x;
+        FoundScale { error: scale - log_unit(share(step)), sigma: sigmas[&key] }
+    })
+}
+
+#[test]
+fn sizes_of_objects_determine_the_scale_of_a_camera_without_depth() {
+    let balls = MONOCULAR
+        .replace(
+            "sizes = \"household\"",
+            "sizes = [{ classes = [\"sports ball\"], size_m = [0.22, 0.22, 0.22], spread = 1.1 }]",
+        )
+        .replace("objects = 12", "objects = 12, classes = [\"sports ball\"]");
+    let drift = balls.replace("scaled_odometry\"", "scaled_odometry\", drift = 0.05");
+    for scene in 1..=20 {
+        let [found, _] = found_scales(&balls, scene, |_| 2f64.ln());
+        let drifts = found_scales(&drift, scene, |share| share * 1.2f64.ln());
+        println!("{scene} {:.2} {found:.3?} {drifts:.3?}", found.error / found.sigma);
+    }
 }
