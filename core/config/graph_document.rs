@@ -1,5 +1,6 @@
 //! Graph documents: all variables and factors by key, in TOML, JSON or YAML.
 mod check;
+mod each;
 mod read;
 mod write;
 

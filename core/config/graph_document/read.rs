@@ -1,5 +1,6 @@
 //! Reading of graph documents.
 use super::check::check;
+use super::each::{Each, entries};
 use crate::document::Document;
 use indexmap::IndexMap;
 use manifactor_document::{Diagnostic, Diagnostics, Errors, Fault, Node, Section, Value};
@@ -7,6 +8,7 @@ use manifactor_graph::loss::Loss;
 use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Noise, Values, Variable};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Reads a graph document, which lists all variables and factors by key.
@@ -26,6 +28,11 @@ use std::sync::Arc;
 /// factor = { type = "between_se2", relative = { translation = [1.0, 0.0], angle = 0.1 } }
 /// noise = { sigmas = [0.1, 0.1, 0.02] }          # unit, where it is left out
 /// loss = { type = "huber", scale = 1.345 }       # none, where it is left out
+///
+/// [[factors]]                                    # one factor for each value of the arrays in `each`
+/// keys = ["x1"]
+/// factor = { type = "position_se2" }
+/// each.factor.position = [[1.0, 0.1], [1.1, 0.0]]
 /// ```
 ///
 /// Reading the text of [`write_graph`](crate::write_graph) restores all values bit for bit.
@@ -88,6 +95,9 @@ pub(crate) struct FactorDocument {
     /// Robust loss, which limits large residuals. Default: none.
     #[serde(default)]
     loss: Option<Box<dyn Loss>>,
+    /// Fields that differ between factors, which this entry then stands for.
+    #[serde(default, rename = "each")]
+    _each: Option<Each>,
 }
 
 /// A graph with the nodes that it was read from.
@@ -98,9 +108,9 @@ pub(super) struct Read<'a> {
     /// Nodes of all declared variables, also of variables with errors.
     pub variables: IndexMap<Key, &'a Node>,
     /// Nodes of all factors in the graph.
-    pub factors: Vec<&'a Node>,
+    pub factors: Vec<Cow<'a, Node>>,
     /// Nodes of factors with errors.
-    pub unread: Vec<&'a Node>,
+    pub unread: Vec<Cow<'a, Node>>,
 }
 
 impl<'a> Read<'a> {
@@ -130,18 +140,21 @@ impl<'a> Read<'a> {
         self.variables.insert(key, node);
     }
 
+    /// Reads the factors of an entry, up to the first one with errors.
     fn factor(&mut self, node: &'a Node, errors: &Errors) {
-        let read = node.read_partial(&[], errors);
-        let Some(FactorDocument { keys, name, factor, noise, loss }) = read else {
-            return self.unread.push(node);
-        };
-        self.graph.push(FactorEntry {
-            keys,
-            name,
-            factor: Arc::from(factor),
-            noise,
-            loss: loss.map(Arc::from),
-        });
-        self.factors.push(node);
+        for entry in entries(node, errors) {
+            let read = entry.read_partial(&[], errors);
+            let Some(FactorDocument { keys, name, factor, noise, loss, .. }) = read else {
+                return self.unread.push(entry);
+            };
+            self.graph.push(FactorEntry {
+                keys,
+                name,
+                factor: Arc::from(factor),
+                noise,
+                loss: loss.map(Arc::from),
+            });
+            self.factors.push(entry);
+        }
     }
 }

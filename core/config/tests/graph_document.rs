@@ -49,6 +49,56 @@ fn wrong(part: &str, by: &str) -> String {
 }
 
 #[test]
+fn an_entry_stands_for_a_factor_for_each_value() {
+    let each = |more: &str| {
+        GOOD.replace("measured = [0.5, 0.25] }\nnoise = { sigmas = [0.1, 0.2] }", &format!("}}\n{more}"))
+    };
+    let (graph, _) = read(
+        Format::Toml,
+        &each("each.factor.measured = [[0.5, 0.25], [0.0, 1.0]]\neach.noise = [{ sigma = 0.1 }, { sigmas = [1.0, 2.0] }]"),
+    )
+    .unwrap();
+    let offsets: Vec<_> = graph.factors()[..2]
+        .iter()
+        .map(|entry| {
+            assert_eq!(entry.keys, ["x0", "x1"].map(Into::into));
+            assert!(entry.loss.is_some());
+            (entry.factor.erased().as_any().downcast_ref::<Offset>().unwrap().measured, entry.noise.clone())
+        })
+        .collect();
+    let noises = [Noise::sigma(0.1).unwrap(), Noise::sigmas(&[1.0, 2.0]).unwrap()];
+    assert_eq!(offsets, [([0.5, 0.25], noises[0].clone()), ([0.0, 1.0], noises[1].clone())]);
+    assert_eq!(graph.factors().len(), 3);
+    let keys = GOOD.replace("keys = [\"x0\", \"x1\"]", "each.keys = [[\"x0\", \"x1\"], [\"x1\", \"x0\"]]");
+    assert_eq!(read(Format::Toml, &keys).unwrap().0.factors()[1].keys, ["x1", "x0"].map(Into::into));
+    for (more, expected) in [
+        ("each = 3", "graph:19:8: expected fields with an array of values"),
+        ("each = []", "expected fields with an array of values"),
+        ("each = {}", "expected fields with an array of values"),
+        ("each.factor.measured = []", "expected fields with an array of values"),
+        ("each.factor = { measured = 3 }", "graph:19:28: expected fields with an array of values"),
+        (
+            "each.factor.measured = [[0.5, 0.25], [0.0]]",
+            "graph:19:38: expected an array of 2, found 1 element",
+        ),
+        ("each.factor.measured = [[0.5, 0.25], [0.0, nan]]", "nan"),
+        ("each.factor = { measured = [[1.0, 2.0]], meassured = [1] }", "unknown field `meassured`"),
+        (
+            "each.factor.measured = [[0.5, 0.25]]\neach.noise.sigma = [1.0, 2.0]",
+            "`noise.sigma` has 2 values, `factor.measured` has 1",
+        ),
+        (
+            "each.factor.type = [\"offset\"]",
+            "`factor.type` is given here for all factors, and in `each` for each of them",
+        ),
+        ("each.keys = [[\"x0\", \"x1\"]]", "`keys` is given here for all factors"),
+    ] {
+        let said = said(Format::Toml, &each(more));
+        assert!(said.contains(expected), "{more}: {said}");
+    }
+}
+
+#[test]
 fn a_graph_is_read() {
     let (graph, values) = read(Format::Toml, GOOD).unwrap();
     assert_eq!(values.len(), 3);
@@ -149,7 +199,7 @@ factor = { type = "offset", measured = [0.5, 1] }
          graph:48:1: missing field `keys`\n\
          graph:49:19: `plane` is a variable, not a factor (there are `balance`, `height` and `offset`)\n\
          graph:52:14: expected a text, found the number 3\n\
-         graph:54:1: unknown field `sigma` (there are `keys`, `name`, `factor`, `noise` and `loss`)\n\
+         graph:54:1: unknown field `sigma` (there are `keys`, `name`, `factor`, `noise`, `loss` and `each`)\n\
          graph:57:15: `offset` connects `x3` to itself (a factor's variables have to be different ones)\n\
          graph:60:2: unknown field `solver` (there are `variables` and `factors`)"
     );
