@@ -43,6 +43,23 @@ impl TrialStep {
     }
 }
 
+/// A minimum within the tolerance of the cost, from which steps continue to rounding error.
+struct Settled {
+    termination: Termination,
+    /// ‖δ‖ of the step that reached it.
+    step: f64,
+}
+
+impl Settled {
+    /// Returns whether the steps have become shorter since, or this was the last one. Steps of constant length that
+    /// hardly lower the cost follow a valley.
+    fn is_reached_by(&self, last_step: f64) -> bool {
+        /// Length of the last step relative to the first one.
+        const MAX_SHARE: f64 = 0.5;
+        last_step <= MAX_SHARE * self.step || last_step == self.step
+    }
+}
+
 /// Result of a trial step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -94,8 +111,10 @@ pub struct Descent<'a> {
     pub(crate) iterations: usize,
     /// Change of the cost by the last accepted step.
     change: f64,
-    /// The termination at a minimum from which steps continue to rounding error.
-    settled: Option<Termination>,
+    /// The minimum from which steps continue to rounding error.
+    settled: Option<Settled>,
+    /// ‖δ‖ of the last accepted step.
+    last_step: f64,
     /// Diagonal of H at the initial estimate.
     initial_diagonal: Vec<f64>,
     observer: &'a mut dyn Observer,
@@ -129,6 +148,7 @@ impl<'a> Descent<'a> {
         let mut descent = Self {
             change: f64::INFINITY,
             settled: None,
+            last_step: f64::INFINITY,
             initial_diagonal: problem.system.diagonal().copied().collect(),
             problem,
             stop,
@@ -239,7 +259,8 @@ impl<'a> Descent<'a> {
         } else if gradient <= *self.stop.gradient * self.unit() {
             Some(Termination::Converged { reason: Tolerance::Gradient })
         } else if self.iterations >= self.stop.max_iterations {
-            Some(self.settled.clone().unwrap_or(Termination::MaxIterations))
+            let settled = self.settled.as_ref().filter(|settled| settled.is_reached_by(self.last_step));
+            Some(settled.map_or(Termination::MaxIterations, |settled| settled.termination.clone()))
         } else {
             None
         }
@@ -345,7 +366,7 @@ impl<'a> Descent<'a> {
         let reason = if self.interrupted {
             return Termination::Interrupted;
         } else if let Some(settled) = &self.settled {
-            return settled.clone();
+            return settled.termination.clone();
         } else if became_undefined > 0 {
             Stall::Domain
         } else if !cost.is_finite() {
@@ -366,8 +387,8 @@ impl<'a> Descent<'a> {
     pub(crate) fn ends(&mut self, termination: &Termination, change: f64) -> bool {
         let continues = *termination == Termination::Converged { reason: Tolerance::RelativeCost }
             && change.abs() > self.stop.exact_cost(self.problem.dim()) * self.at.cost.abs();
-        if continues {
-            self.settled = Some(termination.clone());
+        if continues && self.settled.is_none() {
+            self.settled = Some(Settled { termination: termination.clone(), step: self.last_step });
         }
         !continues
     }
@@ -380,6 +401,7 @@ impl<'a> Descent<'a> {
     /// Accepts the last trial step, and linearizes there. Returns a reason to stop, if there is one.
     pub fn accept(&mut self, step: &TrialStep) -> Option<Termination> {
         self.problem.model.accept();
+        self.last_step = step.norm;
         let (before, after) = (self.at.cost, self.trial.cost);
         let inactive = self.at.inactive;
         self.at = self.problem.linearize();
