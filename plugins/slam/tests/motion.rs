@@ -120,7 +120,7 @@ fn sizes_of_objects_determine_the_scale_of_a_camera_without_depth() {
     let balls = MONOCULAR
         .replace(
             "sizes = \"household\"",
-            "sizes = [{ classes = [\"sports ball\"], size_m = [0.22, 0.22, 0.22], spread = 1.1 }]",
+            "sizes = [{ classes = [\"sports ball\"], size_m = [0.22, 0.22, 0.22], shape = \"ellipsoid\", spread = 1.1 }]",
         )
         .replace("objects = 12", "objects = 12, classes = [\"sports ball\"]");
     let drift = balls.replace("scaled_odometry\"", "scaled_odometry\", drift = 0.05");

@@ -20,7 +20,7 @@ number! {
 ///
 /// It becomes a rule with the factor `size_prior` and a Cauchy loss. `size_m` are the extents of a box around the
 /// object. An ellipsoid that fits the outlines of a box is larger than the box, and the rule takes this into
-/// account.
+/// account, unless the `shape` is an ellipsoid.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClassSize {
@@ -28,6 +28,9 @@ pub struct ClassSize {
     pub classes: Vec<String>,
     /// Extents of a box around the object, in any order. Unit: metres.
     pub size_m: [Extent; 3],
+    /// Shape of the objects.
+    #[serde(default)]
+    pub shape: Shape,
     /// Factor within which two thirds of all objects lie: 1.5 is from 2/3 to 3/2 of `size_m`.
     pub spread: Spread,
     /// Source of the numbers, for readers.
@@ -35,13 +38,27 @@ pub struct ClassSize {
     pub source: Option<String>,
 }
 
+/// Shape of the objects of a class.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// A box, or a body that fills most of one.
+    #[default]
+    Box,
+    /// A ball, a fruit, or another ellipsoid.
+    Ellipsoid,
+}
+
 impl ClassSize {
-    /// Returns the semi-axes of the ellipsoid whose outlines are as wide as the outlines of a box. A box with half
+    /// Returns the semi-axes of the ellipsoid whose outlines are as wide as those of the shape. A box with half
     /// extents a reaches Σ aₖ|uₖ| along a direction u, and an ellipsoid √Σ sₖ²uₖ². The mean squares over all
     /// directions are equal for sₖ² = aₖ² + (2/π) aₖ Σ aⱼ, with the sum over the other two extents.
     pub fn semi_axes(&self) -> Vector3<f64> {
         let half = Vector3::from(self.size_m.map(|extent| 0.5 * *extent));
-        half.map(|a| (a * a + FRAC_2_PI * a * (half.sum() - a)).sqrt())
+        match self.shape {
+            Shape::Ellipsoid => half,
+            Shape::Box => half.map(|a| (a * a + FRAC_2_PI * a * (half.sum() - a)).sqrt()),
+        }
     }
 
     /// Returns the standard deviation of the logarithms of the extents.
@@ -78,7 +95,13 @@ mod tests {
 
     fn size(size_m: [f64; 3]) -> ClassSize {
         let size_m = size_m.map(Extent::literal);
-        ClassSize { classes: vec!["cup".into()], size_m, spread: Spread::literal(1.5), source: None }
+        ClassSize {
+            classes: vec!["cup".into()],
+            size_m,
+            shape: Shape::Box,
+            spread: Spread::literal(1.5),
+            source: None,
+        }
     }
 
     #[test]
@@ -101,6 +124,12 @@ mod tests {
                 squares.fold([0.0; 2], |sum, (a, b)| [sum[0] + a, sum[1] + b]).map(|sum| sum / f64::from(n));
             assert!((of_box / of_ellipsoid - 1.0).abs() < 1e-3, "{of_box} {of_ellipsoid}");
         }
+    }
+
+    #[test]
+    fn a_ball_keeps_its_radius() {
+        let ball = ClassSize { shape: Shape::Ellipsoid, ..size([0.22; 3]) };
+        assert_eq!(ball.semi_axes(), Vector3::repeat(0.11));
     }
 
     #[test]
