@@ -186,4 +186,6 @@ mod book {
     mod authors_guide {}
     #[doc = include_str!("../docs/coming-from.md")]
     mod coming_from {}
+    #[doc = include_str!("../docs/least-squares.md")]
+    mod least_squares {}
 }

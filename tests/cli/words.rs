@@ -4,6 +4,7 @@ use crate::root;
 mod book;
 mod help;
 mod kinds;
+mod least_squares;
 mod log;
 mod mistakes;
 mod slam_systems;

@@ -27,7 +27,8 @@ fn blocks(page: &str) -> Vec<(usize, String)> {
     blocks
 }
 
-/// Reads all tables that name a registered type, and returns the unknown names.
+/// Reads all tables that name a registered type, and returns the unknown names. A factor of an entry with `each` is
+/// not complete without it.
 fn read_all(node: &Node, place: &str) -> Vec<String> {
     let mut unknown = vec![];
     match &node.value {
@@ -47,7 +48,8 @@ fn read_all(node: &Node, place: &str) -> Vec<String> {
                     None => unknown.push(name.clone()),
                 }
             }
-            unknown.extend(table.values().flat_map(|field| read_all(&field.node, place)));
+            let complete = table.iter().filter(|(name, _)| *name != "factor" || !table.contains_key("each"));
+            unknown.extend(complete.flat_map(|(_, field)| read_all(&field.node, place)));
         }
         Value::Array(items) => unknown.extend(items.iter().flat_map(|item| read_all(item, place))),
         _ => {}

@@ -88,8 +88,8 @@ impl DiagonalLimits {
 
 /// A step is accepted if it reaches this share of the predicted decrease.
 const MIN_GAIN: f64 = 1e-4;
-/// λ after a rejected step is at least that of the next line, or this: a smaller one would change the step by almost
-/// nothing.
+/// After a rejected step, λ is at least the lower of this value and the one for `NOTICED_SHARE`: a smaller λ changes the
+/// step by almost nothing.
 const MIN_RAISED_LAMBDA: f64 = 1e-3;
 /// Share of the slope due to damping that changes a step noticeably.
 const NOTICED_SHARE: f64 = 1e-2;

@@ -11,3 +11,4 @@ mod auto;
 mod catalogue;
 mod linear_solvers;
 mod scale;
+mod valleys;

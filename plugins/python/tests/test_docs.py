@@ -8,8 +8,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[3]
-BOOK = ROOT / "docs" / "python.md"
-BLOCKS = re.findall(r"^```python\n(.*?)^```", BOOK.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+
+
+def blocks_of(page: str) -> list[str]:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+
+
+BLOCKS = blocks_of("docs/python.md")
 
 
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
@@ -20,13 +26,12 @@ def test_an_example_of_the_book_runs(number: int, tmp_path: Path, monkeypatch: p
             pytest.importorskip(module)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
-    exec(compile(block, f"{BOOK.name}, block {number}", "exec"), {"__name__": "book"})  # noqa: S102
+    exec(compile(block, f"python.md, block {number}", "exec"), {"__name__": "book"})  # noqa: S102
 
 
-@pytest.mark.parametrize("page", ["README.md", "plugins/python/README.md"])
-def test_the_example_of_a_readme_runs(page: str) -> None:
-    text = (ROOT / page).read_text(encoding="utf-8")
-    (block,) = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+@pytest.mark.parametrize("page", ["README.md", "plugins/python/README.md", "docs/least-squares.md"])
+def test_the_example_of_a_page_runs(page: str) -> None:
+    (block,) = blocks_of(page)
     space: dict[str, object] = {}
     exec(compile(block, page, "exec"), space)  # noqa: S102
     assert space["solution"].converged  # type: ignore[attr-defined]
