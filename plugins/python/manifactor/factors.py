@@ -22,6 +22,7 @@ __all__ = [
     "between_point3",
     "between_se2",
     "between_se3",
+    "between_sim3",
     "between_so2",
     "between_so3",
     "bounding_box",
@@ -52,6 +53,7 @@ __all__ = [
     "prior_quadric",
     "prior_se2",
     "prior_se3",
+    "prior_sim3",
     "prior_so2",
     "prior_so3",
     "prior_twist",
@@ -68,6 +70,7 @@ __all__ = [
     "range_se3_se3",
     "resting",
     "resting_along",
+    "scaled_between_se3",
     "shape_prior",
     "size_prior",
     "supporting_plane",
@@ -256,6 +259,24 @@ def between_se3(*, relative: variables.Se3 | Fields) -> Factor:
         relative: The second variable in the frame of the first.
     """
     return Factor("between_se3", {"relative": untagged(relative)})
+
+
+def between_sim3(*, relative: variables.Sim3 | Fields) -> Factor:
+    """The second variable is at `relative`, seen from the first: r = Log(Z⁻¹ Xᵢ⁻¹ Xⱼ).
+
+    One row for each tangent direction (rx, ry, rz, x, y, z, log_scale). Two rotations that are half a turn apart have two shortest ways between them: there the residual jumps.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "x1"]
+    factor = { type = "between_sim3", relative = { translation = [1.0, 0.0, 0.5], rotation = [0.0, 0.0, 0.6, 0.8], scale = 1.2 } }
+    noise = { sigma = 0.1 }
+    ```
+
+    Args:
+        relative: The second variable in the frame of the first.
+    """
+    return Factor("between_sim3", {"relative": untagged(relative)})
 
 
 def between_so2(*, relative: variables.So2 | Fields) -> Factor:
@@ -498,6 +519,8 @@ def expression(
     se2 * se2 -> se2              The pose y, given in the frame of x, in the outer frame.
     se3 * vector3 -> vector3      The point p, given in the frame of x, in the outer frame.
     se3 * se3 -> se3              The pose y, given in the frame of x, in the outer frame.
+    sim3 * vector3 -> vector3     The point p, given in the frame of x and with its scale, in the outer frame: s R p + t.
+    sim3 * sim3 -> sim3           The pose y, given in the frame of x and with its scale, in the outer frame.
     so2 * vector2 -> vector2      The rotated vector.
     so2 * so2 -> so2              The composition of two rotations; y is applied first.
     so3 * vector3 -> vector3      The rotated vector.
@@ -538,6 +561,7 @@ def expression(
     atan2(y: number, x: number) -> number                       The angle of the vector (x, y) within -π..π, in radians.
     between(x: se2, y: se2) -> se2                              The pose y in the frame of x: x⁻¹y.
     between(x: se3, y: se3) -> se3                              The pose y in the frame of x: x⁻¹y.
+    between(x: sim3, y: sim3) -> sim3                           The pose y in the frame of x: x⁻¹y.
     between(x: so2, y: so2) -> so2                              The rotation y in the frame of x: x⁻¹y.
     between(x: so3, y: so3) -> so3                              The rotation y in the frame of x: x⁻¹y.
     centroid(q: dual_quadric) -> vector3                        The centre of an object.
@@ -558,6 +582,7 @@ def expression(
     height(plane: plane, p: vector3) -> number                  The height of a point above a plane, along its normal.
     inverse(x: se2) -> se2                                      The inverse pose: `inverse(x) * p` is the point p in the frame of x.
     inverse(x: se3) -> se3                                      The inverse pose: `inverse(x) * p` is the point p in the frame of x.
+    inverse(x: sim3) -> sim3                                    The inverse: `inverse(x) * p` is the point p in the frame of x.
     inverse(x: so2) -> so2                                      The inverse rotation.
     inverse(x: so3) -> so3                                      The inverse rotation.
     largest(v: vector2) -> number                               The largest component, the first of equal ones.
@@ -587,12 +612,15 @@ def expression(
     pose(rotation: so3, position: vector3) -> se3               The pose with this rotation and this position.
     position(x: se2) -> vector2                                 The position of a pose.
     position(x: se3) -> vector3                                 The position of a pose.
+    position(x: sim3) -> vector3                                The position of a pose with a scale.
     project(v: vector3) -> vector2                              The projection (x, y)/z of a point in the frame of a camera that looks along z.
     rotation(q: dual_quadric) -> so3                            The rotation of an object.
     rotation(angle: number) -> so2                              The rotation by `angle`, in radians, counter-clockwise.
     rotation(x: se2) -> so2                                     The rotation of a pose.
     rotation(x: se3) -> so3                                     The rotation of a pose.
+    rotation(x: sim3) -> so3                                    The rotation of a pose with a scale.
     rotation(omega: vector3) -> so3                             The rotation about the vector `omega` by its length, in radians.
+    scale(x: sim3) -> number                                    The scale: the length in the outer frame of a unit of the local one.
     semi_axes(q: dual_quadric) -> vector3                       Half the extents of an object along its principal axes.
     sin(a: number) -> number                                    The sine of an angle in radians.
     smallest(v: vector2) -> number                              The smallest component, the first of equal ones.
@@ -1092,6 +1120,24 @@ def prior_se3(*, value: variables.Se3 | Fields) -> Factor:
     return Factor("prior_se3", {"value": untagged(value)})
 
 
+def prior_sim3(*, value: variables.Sim3 | Fields) -> Factor:
+    """The variable is close to `value`: r = Log(Z⁻¹X).
+
+    One row for each tangent direction (rx, ry, rz, x, y, z, log_scale). Two rotations that are half a turn apart have two shortest ways between them: there the residual jumps.
+
+    ```toml
+    [[factors]]
+    keys = ["x0"]
+    factor = { type = "prior_sim3", value = { translation = [1.0, 0.0, 0.5], rotation = [0.0, 0.0, 0.6, 0.8], scale = 1.2 } }
+    noise = { sigma = 0.1 }
+    ```
+
+    Args:
+        value: Expected value of the variable.
+    """
+    return Factor("prior_sim3", {"value": untagged(value)})
+
+
 def prior_so2(*, value: variables.So2 | Fields) -> Factor:
     """The variable is close to `value`: r = Log(Z⁻¹X).
 
@@ -1421,6 +1467,28 @@ def resting_along() -> Factor:
     ```
     """
     return Factor("resting_along", {})
+
+
+def scaled_between_se3(*, relative: variables.Se3 | Fields) -> Factor:
+    """A relative pose in the unit of the odometry: r = Log(Z⁻¹ S⁻¹(Xᵢ⁻¹ Xⱼ)), where S⁻¹ divides the translation by
+    the scale.
+
+    The third variable is the logarithm of the scale, in metres per unit of the odometry. Steps with the same
+    variable have the same scale. Rows: rotation in rad, then translation in units of the odometry. If poses,
+    objects and scale grow together, the residual does not change: something else, such as the size of an
+    object, has to determine the scale.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "x1", "s0"]
+    factor = { type = "scaled_between_se3", relative = { translation = [1.0, 0.0, 0.5], rotation = [0.0, 0.0, 0.6, 0.8] } }
+    noise = { sigma = 0.1 }
+    ```
+
+    Args:
+        relative: The second pose in the frame of the first, in the unit of the odometry.
+    """
+    return Factor("scaled_between_se3", {"relative": untagged(relative)})
 
 
 def shape_prior(*, semi_axes: Numbers, order: Literal['sorted', 'as_given'] | None = None) -> Factor:

@@ -52,6 +52,8 @@ def between(a: Any, b: Any, /) -> Any:
 
     between(x: se3, y: se3) -> se3: The pose y in the frame of x: x⁻¹y.
 
+    between(x: sim3, y: sim3) -> sim3: The pose y in the frame of x: x⁻¹y.
+
     between(x: so2, y: so2) -> so2: The rotation y in the frame of x: x⁻¹y.
 
     between(x: so3, y: so3) -> so3: The rotation y in the frame of x: x⁻¹y.
@@ -126,6 +128,8 @@ def inverse(a: Any, /) -> Any:
     """inverse(x: se2) -> se2: The inverse pose: `inverse(x) * p` is the point p in the frame of x.
 
     inverse(x: se3) -> se3: The inverse pose: `inverse(x) * p` is the point p in the frame of x.
+
+    inverse(x: sim3) -> sim3: The inverse: `inverse(x) * p` is the point p in the frame of x.
 
     inverse(x: so2) -> so2: The inverse rotation.
 
@@ -231,6 +235,8 @@ def position(a: Any, /) -> Any:
     """position(x: se2) -> vector2: The position of a pose.
 
     position(x: se3) -> vector3: The position of a pose.
+
+    position(x: sim3) -> vector3: The position of a pose with a scale.
     """
     return call("position", a)
 
@@ -249,9 +255,16 @@ def rotation(a: Any, /) -> Any:
 
     rotation(x: se3) -> so3: The rotation of a pose.
 
+    rotation(x: sim3) -> so3: The rotation of a pose with a scale.
+
     rotation(omega: vector3) -> so3: The rotation about the vector `omega` by its length, in radians.
     """
     return call("rotation", a)
+
+
+def scale(a: Any, /) -> Any:
+    """scale(x: sim3) -> number: The scale: the length in the outer frame of a unit of the local one."""
+    return call("scale", a)
 
 
 def semi_axes(a: Any, /) -> Any:

@@ -24,6 +24,7 @@ __all__ = [
     "S2",
     "Se2",
     "Se3",
+    "Sim3",
     "So2",
     "So3",
     "Twist",
@@ -732,6 +733,53 @@ class Se3(Group):
         return computed(self, "position")
 
 
+class Sim3(Group):
+    """A pose with a scale, X·Exp(ω, v, λ): tangent (rx, ry, rz, x, y, z, log_scale), in the local frame.
+
+    It maps points from the local frame to the outer one: s R p + t. The tangent is in radians, metres of the local
+    frame, and the logarithm of the scale. A camera without depth measures up to a scale that drifts; a pose graph of
+    such poses corrects it.
+
+    ```toml
+    [values]
+    x0 = { type = "sim3", translation = [1.0, 0.0, 0.5], rotation = [0.0, 0.0, 0.6, 0.8], scale = 1.2 }
+    ```
+
+    Args:
+        translation: Position, in metres.
+        rotation: Unit quaternion (x, y, z, w).
+        scale: Length in the outer frame of a unit of the local one.
+    """
+
+    TYPE: ClassVar[str] = "sim3"
+    SHAPE: ClassVar[str] = "sim3"
+    TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz", "x", "y", "z", "log_scale")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {"translation": slice(4, 7), "rotation": slice(0, 4), "scale": 7}
+
+    def __new__(cls, *, translation: Numbers, rotation: Numbers, scale: float) -> Self:
+        return super().__new__(cls, "variable", "sim3", {"translation": translation, "rotation": rotation, "scale": scale})
+
+    @property
+    def translation(self) -> NDArray[np.float64]:
+        """Position, in metres."""
+        return self.__getattr__("translation")  # type: ignore[no-any-return]
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Unit quaternion (x, y, z, w)."""
+        return self.__getattr__("rotation")  # type: ignore[no-any-return]
+
+    @property
+    def scale(self) -> float:
+        """Length in the outer frame of a unit of the local one."""
+        return self.__getattr__("scale")  # type: ignore[no-any-return]
+
+    @property
+    def position(self) -> Any:
+        """The position of a pose with a scale."""
+        return computed(self, "position")
+
+
 class So2(Group):
     """A rotation in the plane: tangent (theta), in radians, counter-clockwise.
 
@@ -896,6 +944,7 @@ BY_TYPE: dict[str, type[Variable]] = {
     "s2": S2,
     "se2": Se2,
     "se3": Se3,
+    "sim3": Sim3,
     "so2": So2,
     "so3": So3,
     "twist": Twist,

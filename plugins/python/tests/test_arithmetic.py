@@ -173,6 +173,7 @@ VALUES: list[Any] = [
     mf.So3.exp([0.1, 0.2, 0.3]),
     mf.Se2(translation=[1 / 3, -0.0], angle=1e-300),
     mf.Se3.exp([0.1, 0.2, 0.3, 1, 2, 3]),
+    mf.Sim3.exp([0.1, 0.2, 0.3, 1, 2, 3, 0.2]),
     mf.Point1(position=[0.1]),
     mf.Point2(position=[0.1, 1 / 3]),
     mf.Point3(position=[0, 1, 2]),
