@@ -50,10 +50,10 @@ write norm(v)";
                          ^
 there is dot(a: vector3, b: vector3) -> number";
     an_object_where_a_pose_is_taken: "norm(position(q))" => "
-`position` takes an se2 or an se3 here, found a dual_quadric
+`position` takes an se2 or an se3 or a sim3 here, found a dual_quadric
   norm(position(q))
                 ^
-there is position(x: se2) -> vector2, position(x: se3) -> vector3; what takes a dual_quadric: centroid, extent, major_axis, pose, rotation, semi_axes";
+there is position(x: se2) -> vector2, position(x: se3) -> vector3, position(x: sim3) -> vector3; what takes a dual_quadric: centroid, extent, major_axis, pose, rotation, semi_axes";
     too_few_arguments: "1 - dot(up)" => "
 `dot` takes 2 arguments, found 1
   1 - dot(up)
@@ -147,7 +147,7 @@ fn types_and_names_are_checked_too() {
     assert_eq!(
         unknown,
         "unknown type of variables `dual_quadrik`\n  dual_quadrik\n  ^^^^^^^^^^^^\n\
-         did you mean `dual_quadric`? there are dual_quadric, point1, point2, point3, se2, se3, so2, so3"
+         did you mean `dual_quadric`? there are dual_quadric, point1, point2, point3, se2, se3, sim3, so2, so3"
     );
     let taken = says(&[("up", "point3")], "norm(up)");
     assert_eq!(taken, "`up` means something already: choose another name\n  up\n  ^^");

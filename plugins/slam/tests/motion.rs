@@ -124,9 +124,35 @@ fn sizes_of_objects_determine_the_scale_of_a_camera_without_depth() {
         )
         .replace("objects = 12", "objects = 12, classes = [\"sports ball\"]");
     let drift = balls.replace("scaled_odometry\"", "scaled_odometry\", drift = 0.05");
-    for scene in 1..=20 {
-        let [found, _] = found_scales(&balls, scene, |_| 2f64.ln());
-        let drifts = found_scales(&drift, scene, |share| share * 1.2f64.ln());
-        println!("{scene} {:.2} {found:.3?} {drifts:.3?}", found.error / found.sigma);
+    for scene in 1..=3 {
+        let [constant, _] = found_scales(&balls, scene, |_| 2f64.ln());
+        let [first, last] = found_scales(&drift, scene, |share| share * 1.2f64.ln());
+        let [household, _] = found_scales(MONOCULAR, scene, |_| 0.5f64.ln());
+        for found in [&constant, &first, &last, &household] {
+            assert!(found.error.abs() < 3.0 * found.sigma && found.sigma < 0.11, "{scene}: {found:?}");
+        }
+        assert!(
+            constant.sigma < 0.04 && (last.error - first.error).abs() < 0.05,
+            "{scene}: {first:?} {last:?}"
+        );
+    }
+}
+
+#[test]
+fn a_stream_estimates_the_scale_as_a_batch_does() {
+    for more in ["motion.first=0.5", "motion.drift=0.05"] {
+        let run = run_of(MONOCULAR, &[more]);
+        let (online, batch, _) = both(&run, &run.variants[0], None);
+        let (found, expected) = (online.solve.final_cost, batch.solve.final_cost);
+        assert!(found <= expected * (1.0 + 1e-3), "{more}: {found} {expected}");
+        let run = run_of(MONOCULAR, &[more, "online.window.poses=20"]);
+        let (online, ..) = both(&run, &run.variants[0], None);
+        let stream = online.online.unwrap();
+        assert_eq!(stream.refusals, 0, "{more}");
+        assert!(
+            online.trajectory[0].estimate.ate.rmse < 0.3,
+            "{more}: {:?}",
+            online.trajectory[0].estimate.ate
+        );
     }
 }
