@@ -88,11 +88,8 @@ impl DiagonalLimits {
 
 /// A step is accepted if it reaches this share of the predicted decrease.
 const MIN_GAIN: f64 = 1e-4;
-/// After a rejected step, λ is at least the lower of this value and the one for `NOTICED_SHARE`: a smaller λ changes the
-/// step by almost nothing.
+/// Minimum λ after a rejected step, because a smaller λ changes the step by almost nothing.
 const MIN_RAISED_LAMBDA: f64 = 1e-3;
-/// Share of the slope due to damping that changes a step noticeably.
-const NOTICED_SHARE: f64 = 1e-2;
 /// λ above which a small step alone does not indicate a minimum.
 const MAX_TRUSTED_LAMBDA: f64 = 1.0;
 /// Share of the slope due to damping above which damping holds the step back. With bounds, the damping
@@ -225,9 +222,7 @@ impl LevenbergMarquardt {
                 if descent.interrupted() {
                     return Termination::Interrupted;
                 }
-                let noticed =
-                    if step.damped > 0.0 { *lambda * NOTICED_SHARE / step.damped } else { f64::INFINITY };
-                (*lambda, rise) = ((*lambda * rise).max(noticed.min(MIN_RAISED_LAMBDA)), rise * 2.0);
+                (*lambda, rise) = ((*lambda * rise).max(MIN_RAISED_LAMBDA), rise * 2.0);
                 if *lambda > *self.max_lambda {
                     return match descent.is_at_rest(&mut step) {
                         true => Termination::Converged { reason: Tolerance::RelativeCost },

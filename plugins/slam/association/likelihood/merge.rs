@@ -22,11 +22,11 @@ const MAX_SHARED_FRAMES: f64 = 0.05;
 /// Distance of the centres at which two objects may still be one, in standard deviations. Their sizes are
 /// added to it.
 const MAX_CENTRE_DISTANCE_SIGMA: f64 = 3.0;
-/// Sim3 of classes below which the limit is divided by `DIFFERENT_CLASS_FACTOR`.
+/// Similarity of classes below which the limit is divided by `DIFFERENT_CLASS_FACTOR`.
 const DIFFERENT_CLASS_SIMILARITY: f64 = 0.1;
 /// Divides `merge_error` for objects of different classes.
 const DIFFERENT_CLASS_FACTOR: f64 = 1.4;
-/// Sim3 of classes above which the limit is multiplied by `SAME_CLASS_FACTOR`, if one object contains
+/// Similarity of classes above which the limit is multiplied by `SAME_CLASS_FACTOR`, if one object contains
 /// the centre of the other and both places are known well enough.
 const SAME_CLASS_SIMILARITY: f64 = 0.5;
 /// Multiplies `merge_error` for objects of one class in one place: no ellipsoid explains all boxes of a
