@@ -77,10 +77,10 @@ pub(crate) fn scaled_integral<T: Scalar>(theta2: T, lambda: T) -> ScaledIntegral
         (b, c)
     } else {
         let e = exponential(theta2);
-        let (sin, cos) = (e.sin_half * e.cos_half * 2.0, T::one() - theta2 * e.a);
+        let (sinc, cos) = (e.sin_half * e.cos_half * 2.0, T::one() - theta2 * e.a);
         let growth = lambda.exp();
         let over = |numerator: T| numerator / size;
-        (over(growth * (lambda * sin - cos) + T::one()), over(growth * (lambda * e.a - sin) + a))
+        (over(growth * (lambda * sinc - cos) + T::one()), over(growth * (lambda * e.a - sinc) + a))
     };
     let p = a - theta2 * c;
     let norm2 = p * p + theta2 * b * b;
