@@ -3,7 +3,7 @@ use crate::groups::{Coordinates, LieGroup, Se3, So3, Xyzw, jet, small_angle};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::quantity::{Quantity, Shape};
 use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
-use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, U4, U7, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, U4, U7, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -140,8 +140,7 @@ impl Sim3 {
         let (w, v, lambda) = split_tangent(xi);
         let integral = small_angle::scaled_integral(w.norm_squared(), lambda);
         let inverse = |x: Vector3<f64>| apply(integral.inverse, &w, &x);
-        let of_rotation = Se3::inverse_right_jacobian(&Vector6::new(w.x, w.y, w.z, 0.0, 0.0, 0.0));
-        let of_rotation: Matrix3<f64> = of_rotation.fixed_view::<3, 3>(0, 0).clone_owned();
+        let of_rotation = So3::inverse_right_jacobian(&w);
         let moved = derivatives_of_translation(&w, &v, lambda);
         let by_rotation = -Matrix3::from_columns(&[0, 1, 2].map(|i| inverse(moved[i]))) * of_rotation;
         let scaled = So3::exp(&w).matrix() * lambda.exp();
@@ -157,19 +156,12 @@ impl Sim3 {
 
 /// Returns the derivatives of W(ω, λ)v with respect to ω and λ.
 fn derivatives_of_translation(w: &Vector3<f64>, v: &Vector3<f64>, lambda: f64) -> [Vector3<f64>; 4] {
-    let dual = |x: f64, slot: usize| with_slope::<JetOf<U4>>(x, 4, slot, 1.0);
+    let dual = |x: f64, slot: usize| jet::<JetOf<U4>>(x, 4, slot, [1.0, 0.0, 0.0]);
     let (w, lambda) = (Vector3::new(dual(w.x, 0), dual(w.y, 1), dual(w.z, 2)), dual(lambda, 3));
     let integral = small_angle::scaled_integral(w.norm_squared(), lambda);
     let moved = apply(integral.forward, &w, &v.lift());
     let slope = |row: usize, slot: usize| moved[row].gradient().map_or(0.0, |gradient| gradient[slot]);
     [0, 1, 2, 3].map(|slot| Vector3::from_fn(|row, _| slope(row, slot)))
-}
-
-/// Returns a jet of `dim` slots whose derivative is `slope` in one slot and zero in the others.
-fn with_slope<J: Jet>(value: f64, dim: usize, slot: usize, slope: f64) -> J {
-    let mut gradient = [0.0; 7];
-    gradient[slot] = slope;
-    J::with_gradient(value, &gradient[..dim])
 }
 
 /// Storage order: the rotation, the translation, the scale.
@@ -200,7 +192,7 @@ impl Manifold for Sim3 {
         let r = self.rotation.matrix() * self.scale;
         let translation =
             Vector3::from_fn(|i, _| jet(self.translation[i], 7, 3, [r[(i, 0)], r[(i, 1)], r[(i, 2)]]));
-        Sim3::new(self.rotation.seed_in(7, 0), translation, with_slope(self.scale, 7, 6, self.scale))
+        Sim3::new(self.rotation.seed_in(7, 0), translation, jet(self.scale, 7, 6, [self.scale, 0.0, 0.0]))
     }
     fn retract(&self, delta: &Vector7<f64>) -> Self {
         LieGroup::compose(self, &Sim3::exp(delta))
