@@ -4,7 +4,7 @@
 //! models in the same way: neither depends on the variables of a frame besides its pose.
 use manifactor_geometry::Se3;
 use manifactor_graph::loss::Loss;
-use manifactor_graph::{FactorEntry, Noise, Values, Variable};
+use manifactor_graph::{Factor, FactorEntry, Key, Noise, Values, Variable};
 use std::fmt::{self, Debug};
 use std::sync::Arc;
 
@@ -93,6 +93,12 @@ pub struct RelativePose<'a> {
 }
 
 impl MotionStep<'_> {
+    /// Returns a factor of the odometry of this step, with its noise, its loss and its name.
+    pub fn entry(&self, keys: Vec<Key>, factor: Arc<dyn Factor>) -> FactorEntry {
+        let RelativePose { noise, name, loss, .. } = self.odometry;
+        FactorEntry { keys, name: name.map(Arc::from), factor, noise: noise.clone(), loss: loss.cloned() }
+    }
+
     /// Returns the error of a model without a factor for this step.
     pub fn error(&self, why: &dyn fmt::Display) -> MotionError {
         let [from, to] = self.frames;

@@ -167,7 +167,7 @@ impl RunSettings {
         let is_estimated = self.variance_components.as_ref().is_some_and(|variance| variance.odometry);
         if is_estimated && !is_by_odometry(&self.motion) {
             let message =
-                format!("the motion model `{model}` has no odometry whose noise could be estimated");
+                format!("the noise of the odometry cannot be estimated with the motion model `{model}`");
             let help = "set `variance_components.odometry = false`, or leave `motion` out";
             errors.report(place("variance_components"), Fault::with_help(message, help));
         }

@@ -56,7 +56,7 @@ fn what_does_not_go_with_a_motion_model_is_refused() {
     let own = refused("[[variables]]\nkey = \"v3\"\nvalue = { type = \"point1\", position = [0.0] }");
     assert!(own.contains("`v3` is the key of a variable of the motion model `constant_velocity`"), "{own}");
     let variance = refused("[variance_components]\nodometry = true");
-    assert!(variance.contains("has no odometry whose noise could be estimated"), "{variance}");
+    assert!(variance.contains("the noise of the odometry cannot be estimated with"), "{variance}");
 }
 
 /// A camera without depth that walks around a table with objects of known classes.

@@ -1,4 +1,4 @@
-use super::{MotionError, MotionModel, MotionStep, RelativePose, pose_key};
+use super::{MotionError, MotionModel, MotionStep, pose_key};
 use manifactor_geometry::{Between, Se3};
 use manifactor_graph::{FactorEntry, register};
 use schemars::JsonSchema;
@@ -23,14 +23,8 @@ impl MotionModel for OdometryMotion {
     }
 
     fn factors(&self, step: &MotionStep<'_>) -> Result<Vec<FactorEntry>, MotionError> {
-        let RelativePose { pose, noise, name, loss } = step.odometry;
-        Ok(vec![FactorEntry {
-            keys: step.frames.map(pose_key).to_vec(),
-            name: name.map(Arc::from),
-            factor: Arc::new(Between { relative: pose }),
-            noise: noise.clone(),
-            loss: loss.cloned(),
-        }])
+        let factor = Between { relative: step.odometry.pose };
+        Ok(vec![step.entry(step.frames.map(pose_key).to_vec(), Arc::new(factor))])
     }
 }
 register!(dyn MotionModel, "odometry", OdometryMotion);

@@ -1,4 +1,4 @@
-use super::{MotionError, MotionModel, MotionStep, RelativePose, pose_key};
+use super::{MotionError, MotionModel, MotionStep, pose_key};
 use manifactor_geometry::{Between, LieGroup, Point1, Prior, ScaledBetween, Se3};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Factor, FactorEntry, Key, Noise, Values, register};
@@ -89,14 +89,8 @@ impl MotionModel for ScaledOdometryMotion {
 
     fn factors(&self, step: &MotionStep<'_>) -> Result<Vec<FactorEntry>, MotionError> {
         let [from, to] = step.frames;
-        let RelativePose { pose, noise, name, loss } = step.odometry;
-        let measured = FactorEntry {
-            keys: vec![pose_key(from), pose_key(to), self.scale_key(from)],
-            name: name.map(Arc::from),
-            factor: Arc::new(ScaledBetween { relative: pose }),
-            noise: noise.clone(),
-            loss: loss.cloned(),
-        };
+        let keys = vec![pose_key(from), pose_key(to), self.scale_key(from)];
+        let measured = step.entry(keys, Arc::new(ScaledBetween { relative: step.odometry.pose }));
         let is_new = self.scale(step, from).is_none();
         let new = is_new.then(|| self.of_new_scale(step)).transpose()?;
         Ok(new.into_iter().chain([measured]).collect())

@@ -87,13 +87,13 @@ impl StreamNoise {
         // one noise for all boxes: there are too few for several
         let boxes = if variance.boxes == BoxGroups::Given { BoxGroups::Given } else { BoxGroups::All };
         let variance = VarianceSettings { rounds: MAX_ROUNDS, boxes, size: false, ..variance.clone() };
-        let is_odometry_estimated = variance.odometry;
+        let estimates_odometry = variance.odometry;
         settings.variance_components = Some(variance);
         let sequence = Arc::new(first_frames);
         let mapping = Mapping::new(&sequence, &settings)?;
         let estimate = Estimate::new(sequence, mapping, &settings, observer)?;
         let Some(found) = estimate.components.last() else { return Ok(None) };
-        if is_odometry_estimated && found.odometry.is_none() && has_unknown_noise(&estimate.mapping) {
+        if estimates_odometry && found.odometry.is_none() && has_unknown_noise(&estimate.mapping) {
             return Ok(None);
         }
         let odometry = found.odometry.map(|choice| choice.smallest_noise);
