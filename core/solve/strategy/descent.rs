@@ -46,17 +46,22 @@ impl TrialStep {
 /// A minimum within the tolerance of the cost, from which steps continue to rounding error.
 struct Settled {
     termination: Termination,
-    /// ‖δ‖ of the step that reached it.
-    step: f64,
+    /// Index in the history of the step that reached it.
+    since: usize,
 }
 
 impl Settled {
-    /// Returns whether the steps have become shorter since, or this was the last one. Steps of constant length that
-    /// hardly lower the cost follow a valley.
-    fn is_reached_by(&self, last_step: f64) -> bool {
-        /// Length of the last step relative to the first one.
+    /// Returns whether the last steps become shorter at a constant rate or faster: the longest one of their second
+    /// half is at most half as long as the longest one of their first half. In a valley, steps that hardly lower the
+    /// cost stay long.
+    fn is_reached(&self, history: &[IterationRecord]) -> bool {
+        const LAST_STEPS: usize = 16;
         const MAX_SHARE: f64 = 0.5;
-        last_step <= MAX_SHARE * self.step || last_step == self.step
+        let accepted = history[self.since..].iter().rev().filter(|record| record.accepted);
+        let steps: Vec<f64> = accepted.take(LAST_STEPS).map(|record| record.step).collect();
+        let (last, before) = steps.split_at(steps.len() / 2);
+        let longest = |steps: &[f64]| steps.iter().copied().fold(0.0, f64::max);
+        longest(last) <= MAX_SHARE * longest(before)
     }
 }
 
@@ -113,8 +118,6 @@ pub struct Descent<'a> {
     change: f64,
     /// The minimum from which steps continue to rounding error.
     settled: Option<Settled>,
-    /// ‖δ‖ of the last accepted step.
-    last_step: f64,
     /// Diagonal of H at the initial estimate.
     initial_diagonal: Vec<f64>,
     observer: &'a mut dyn Observer,
@@ -148,7 +151,6 @@ impl<'a> Descent<'a> {
         let mut descent = Self {
             change: f64::INFINITY,
             settled: None,
-            last_step: f64::INFINITY,
             initial_diagonal: problem.system.diagonal().copied().collect(),
             problem,
             stop,
@@ -259,7 +261,7 @@ impl<'a> Descent<'a> {
         } else if gradient <= *self.stop.gradient * self.unit() {
             Some(Termination::Converged { reason: Tolerance::Gradient })
         } else if self.iterations >= self.stop.max_iterations {
-            let settled = self.settled.as_ref().filter(|settled| settled.is_reached_by(self.last_step));
+            let settled = self.settled.as_ref().filter(|settled| settled.is_reached(&self.history));
             Some(settled.map_or(Termination::MaxIterations, |settled| settled.termination.clone()))
         } else {
             None
@@ -388,7 +390,10 @@ impl<'a> Descent<'a> {
         let continues = *termination == Termination::Converged { reason: Tolerance::RelativeCost }
             && change.abs() > self.stop.exact_cost(self.problem.dim()) * self.at.cost.abs();
         if continues && self.settled.is_none() {
-            self.settled = Some(Settled { termination: termination.clone(), step: self.last_step });
+            self.settled = Some(Settled {
+                termination: termination.clone(),
+                since: self.history.len().saturating_sub(1),
+            });
         }
         !continues
     }
@@ -401,7 +406,6 @@ impl<'a> Descent<'a> {
     /// Accepts the last trial step, and linearizes there. Returns a reason to stop, if there is one.
     pub fn accept(&mut self, step: &TrialStep) -> Option<Termination> {
         self.problem.model.accept();
-        self.last_step = step.norm;
         let (before, after) = (self.at.cost, self.trial.cost);
         let inactive = self.at.inactive;
         self.at = self.problem.linearize();
