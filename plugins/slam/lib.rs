@@ -12,8 +12,8 @@ pub use manifactor_mapping::{
 pub use manifactor_metrics as metrics;
 pub use manifactor_online as online;
 pub use manifactor_recording::{
-    class, fusion, journal, measurement, pose_graph, prior_map, recording, register_measurement, sequence,
-    source, stream,
+    camera, class, fusion, journal, measurement, pose_graph, prior_map, recording, register_measurement,
+    sequence, source, stream,
 };
 pub use manifactor_ros as ros;
 pub use manifactor_run::{output, record, report, run};

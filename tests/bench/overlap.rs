@@ -70,28 +70,18 @@ impl Default for Projection {
 
 #[typetag::serialize(name = "iou")]
 impl Association for Iou {
-    fn create_associator(
-        &self,
-        camera: Camera,
-        aliases: &ClassAliases,
-        known: &[Arc<PriorObject>],
-    ) -> Box<dyn Associator> {
+    fn create_associator(&self, aliases: &ClassAliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator> {
         let Self { least, frames } = *self;
         let rule = Projection { least, least_before: least, frames, visible: Share::literal(0.0) };
-        Box::new(Overlap::new(rule, false, camera, aliases, known))
+        Box::new(Overlap::new(rule, false, aliases, known))
     }
 }
 register!(dyn Association, "iou", Iou);
 
 #[typetag::serialize(name = "projection")]
 impl Association for Projection {
-    fn create_associator(
-        &self,
-        camera: Camera,
-        aliases: &ClassAliases,
-        known: &[Arc<PriorObject>],
-    ) -> Box<dyn Associator> {
-        Box::new(Overlap::new(self.clone(), true, camera, aliases, known))
+    fn create_associator(&self, aliases: &ClassAliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator> {
+        Box::new(Overlap::new(self.clone(), true, aliases, known))
     }
 }
 register!(dyn Association, "projection", Projection);
@@ -101,7 +91,6 @@ register!(dyn Association, "projection", Projection);
 struct Overlap {
     rule: Projection,
     by_class: bool,
-    camera: Camera,
     aliases: ClassAliases,
     objects: BTreeMap<ObjectId, Last>,
     next: u32,
@@ -116,33 +105,32 @@ struct Last {
 }
 
 impl Overlap {
-    fn new(
-        rule: Projection,
-        by_class: bool,
-        camera: Camera,
-        aliases: &ClassAliases,
-        known: &[Arc<PriorObject>],
-    ) -> Self {
+    fn new(rule: Projection, by_class: bool, aliases: &ClassAliases, known: &[Arc<PriorObject>]) -> Self {
         let last = |object: &Arc<PriorObject>| {
             let class = object.classes.best().map(|class| class.name);
             (object.id, Last { seen: None, class })
         };
         let objects: BTreeMap<_, _> = known.iter().map(last).collect();
         let next = objects.last_key_value().map_or(1, |(id, _)| id.0.saturating_add(1));
-        Self { rule, by_class, camera, aliases: aliases.clone(), objects, next }
+        Self { rule, by_class, aliases: aliases.clone(), objects, next }
     }
 
     fn class(&self, detection: &Detection) -> Option<String> {
         detection.scores.best().map(|(class, _)| self.aliases.canonical(class))
     }
 
-    /// Outline of an object, if enough of it is inside the image.
-    fn outline(&self, pose: Option<Se3>, quadric: Option<DualQuadric>) -> Option<BoundingBox> {
+    /// Outline of an object, if enough of it is inside the image of a camera.
+    fn outline(
+        &self,
+        camera: Camera,
+        pose: Option<Se3>,
+        quadric: Option<DualQuadric>,
+    ) -> Option<BoundingBox> {
         let (pose, quadric) = (pose?, quadric?);
         let predict = |model| {
             // the prediction does not depend on the measured box
             let bounding_box = BoundingBox { xmin: 0.0, ymin: 0.0, xmax: 0.0, ymax: 0.0 };
-            BoundingBoxFactor { bounding_box, camera: self.camera, model }.predict(&pose, &quadric)
+            BoundingBoxFactor { bounding_box, camera, model }.predict(&pose, &quadric)
         };
         let (all, inside) = (predict(BoxModel::Standard)?, predict(BoxModel::Truncated)?);
         (inside.area() >= *self.rule.visible * all.area()).then_some(inside)
@@ -152,11 +140,13 @@ impl Overlap {
 impl Associator for Overlap {
     fn associate(&self, image: &FrameDetections<'_>, map: &dyn MapEstimate) -> Vec<Option<ObjectId>> {
         let (pose, rule) = (map.pose(image.frame), &self.rule);
+        // the recordings of the benchmarks have one camera
+        let camera = image.detections.first().map(|detection| detection.camera.model);
         let classes: Vec<_> = image.detections.iter().map(|d| self.class(d)).collect();
         let mut overlaps = vec![];
         for (column, (id, last)) in self.objects.iter().enumerate() {
             let before = last.seen.filter(|(frame, _)| frame + rule.frames >= image.frame).map(|(_, b)| b);
-            let outline = self.outline(pose, map.object(*id));
+            let outline = camera.and_then(|camera| self.outline(camera, pose, map.object(*id)));
             for (row, detection) in image.detections.iter().enumerate() {
                 if self.by_class && classes[row] != last.class {
                     continue;

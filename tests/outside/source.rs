@@ -23,7 +23,16 @@ impl SequenceSource for Nothing {
     fn load(&self, _folders: &InputFolders) -> Result<Sequence, SourceError> {
         let frame = |i: usize| Frame::new(i as f64, Se3::identity());
         Ok(Sequence {
-            camera: Camera { fx: 320.0, fy: 320.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 },
+            cameras: Camera {
+                fx: 320.0,
+                fy: 320.0,
+                cx: 320.0,
+                cy: 240.0,
+                skew: 0.0,
+                width: 640,
+                height: 480,
+            }
+            .into(),
             body_from_camera: None,
             frames: (0..self.frames).map(frame).collect(),
             detections: vec![],

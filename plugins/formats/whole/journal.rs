@@ -6,11 +6,12 @@
 use super::{CHECKED_LINE_START, checked_line, open_regular, read_checked_line, read_regular};
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Write};
-use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 /// A record type of a journal.
 pub trait JournalRecord: Sized {
+    /// What is known besides the lines, to parse them.
+    type Context;
     /// Name of the records in messages.
     const NAME: &'static str;
     /// Beginnings of a header line with the journal's key: the current one, then earlier versions. Empty for
@@ -27,7 +28,7 @@ pub trait JournalRecord: Sized {
     ///
     /// # Errors
     /// If the line is not a record, with the reason as text.
-    fn read(line: &[u8]) -> Result<Self, String>;
+    fn read(line: &[u8], context: &Self::Context) -> Result<Self, String>;
 }
 
 /// The reason why a journal cannot be read or written.
@@ -81,10 +82,10 @@ pub enum JournalError {
 
 /// A journal that is open for appending.
 #[derive(Debug)]
-pub struct Journal<R> {
+pub struct Journal<R: JournalRecord> {
     path: PathBuf,
     file: File,
-    records: PhantomData<R>,
+    context: R::Context,
 }
 
 impl<R: JournalRecord> Journal<R> {
@@ -93,7 +94,7 @@ impl<R: JournalRecord> Journal<R> {
     /// # Errors
     /// If the file cannot be read or written, is a link, or is not such a journal; it is then unchanged. If
     /// the journal has a key and another program has it open.
-    pub fn open(path: &Path, key: &str) -> Result<(Self, Vec<R>), JournalError> {
+    pub fn open(path: &Path, key: &str, context: R::Context) -> Result<(Self, Vec<R>), JournalError> {
         let io = |source| JournalError::Io { path: path.to_owned(), source };
         let mut file = open_regular(path).map_err(io)?;
         let header = R::HEADER_STARTS.first().map_or_else(String::new, |begin| format!("{begin}{key}\"}}\n"));
@@ -117,11 +118,11 @@ impl<R: JournalRecord> Journal<R> {
                 false => JournalError::NoJournal { path, record: R::NAME },
             });
         };
-        let (records, whole) = records(lines, !header.is_empty(), path)?;
+        let (records, whole) = records(lines, !header.is_empty(), path, &context)?;
         if whole < lines.len() {
             file.set_len((header.len() + whole) as u64).map_err(io)?;
         }
-        Ok((Self { path: path.to_owned(), file, records: PhantomData }, records))
+        Ok((Self { path: path.to_owned(), file, context }, records))
     }
 
     /// Appends a record, and returns it as it will be read back. If writing fails, the file is unchanged.
@@ -131,7 +132,7 @@ impl<R: JournalRecord> Journal<R> {
     pub fn append(&mut self, record: &R) -> io::Result<R> {
         let line = record.write()?;
         // Only lines that can be read back are written.
-        let read = R::read(line.as_bytes()).map_err(io::Error::other)?;
+        let read = R::read(line.as_bytes(), &self.context).map_err(io::Error::other)?;
         let length = self.file.metadata()?.len();
         if let Err(error) = self.file.write_all(checked_line(&line).as_bytes()) {
             // An incomplete line would end the journal, so it is removed.
@@ -159,9 +160,9 @@ impl<R: JournalRecord> Journal<R> {
 ///
 /// # Errors
 /// If the file cannot be read or is not such a journal.
-pub fn read<R: JournalRecord>(path: &Path) -> Result<Vec<R>, JournalError> {
+pub fn read<R: JournalRecord<Context = ()>>(path: &Path) -> Result<Vec<R>, JournalError> {
     match read_regular(path) {
-        Ok(bytes) => Ok(records(&bytes, false, path)?.0),
+        Ok(bytes) => Ok(records(&bytes, false, path, &())?.0),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(vec![]),
         Err(source) => Err(JournalError::Io { path: path.to_owned(), source }),
     }
@@ -173,6 +174,7 @@ fn records<R: JournalRecord>(
     lines: &[u8],
     has_header: bool,
     path: &Path,
+    context: &R::Context,
 ) -> Result<(Vec<R>, usize), JournalError> {
     let mut records = vec![];
     let mut whole = 0;
@@ -190,7 +192,7 @@ fn records<R: JournalRecord>(
         whole += line.len() + 1;
         if !line.is_empty() {
             let object = read_checked_line(line).map_err(|fault| mistake(fault.to_owned()))?;
-            records.push(R::read(&object).map_err(mistake)?);
+            records.push(R::read(&object, context).map_err(mistake)?);
         }
     }
     Ok((records, whole))

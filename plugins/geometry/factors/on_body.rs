@@ -12,7 +12,8 @@ use std::sync::Arc;
 /// A factor on the pose of a body, if the variable is the pose of a camera mounted on it.
 ///
 /// The factor gets world_from_body = world_from_camera · body_from_camera⁻¹. An example is a position from a
-/// satellite receiver, or a loop closure between poses of a robot. Rows and noise are those of `factor`.
+/// satellite receiver, a loop closure between poses of a robot, or a box in the image of a second camera, which is then
+/// the body. Rows and noise are those of `factor`.
 ///
 /// ```toml
 /// [[factors]]
@@ -110,6 +111,12 @@ impl OnBody {
             casts,
         })?;
         Ok(Self { document: Document { factor, body_from_camera, poses }, compiled })
+    }
+
+    /// Returns the factor that an `on_body` factor contains, or the factor itself if it is of another type.
+    pub fn unwrapped(factor: &dyn Factor) -> &dyn Factor {
+        let compiled = factor.erased().as_any().downcast_ref::<Compiled>();
+        compiled.map_or(factor, |compiled| &*compiled.factor)
     }
 }
 

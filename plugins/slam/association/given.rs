@@ -1,6 +1,5 @@
 use super::{Association, Associator, Corrections, FrameDetections, MapEstimate};
 use manifactor_graph::register;
-use manifactor_quadric::Camera;
 use manifactor_recording::class::ClassAliases;
 use manifactor_recording::prior_map::PriorObject;
 use manifactor_recording::sequence::ObjectId;
@@ -20,7 +19,7 @@ pub struct GivenAssociation {}
 
 #[typetag::serialize(name = "given")]
 impl Association for GivenAssociation {
-    fn create_associator(&self, _: Camera, _: &ClassAliases, _: &[Arc<PriorObject>]) -> Box<dyn Associator> {
+    fn create_associator(&self, _: &ClassAliases, _: &[Arc<PriorObject>]) -> Box<dyn Associator> {
         Box::new(Self {})
     }
 

@@ -10,7 +10,7 @@ mod likelihood;
 mod names;
 
 use manifactor_geometry::Se3;
-use manifactor_quadric::{Camera, DualQuadric};
+use manifactor_quadric::DualQuadric;
 use manifactor_recording::class::ClassAliases;
 use manifactor_recording::prior_map::PriorObject;
 use manifactor_recording::sequence::{Detection, ObjectId};
@@ -27,12 +27,7 @@ pub use names::{DetectionMove, ObjectIdChanges, ObjectMerge};
 pub trait Association: Debug + Send + Sync {
     /// Creates the associator. `known` are the objects of a prior map with trusted covariances; empty without
     /// a prior map.
-    fn create_associator(
-        &self,
-        camera: Camera,
-        aliases: &ClassAliases,
-        known: &[Arc<PriorObject>],
-    ) -> Box<dyn Associator>;
+    fn create_associator(&self, aliases: &ClassAliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator>;
 
     /// Returns whether the method takes the object ids of the source. If not, these ids can serve to score
     /// it.
@@ -105,7 +100,7 @@ pub struct FrameDetections<'a> {
 
 /// The current estimate of poses and objects.
 pub trait MapEstimate {
-    /// Returns the camera pose of a frame, or `None` if it is no longer in the map.
+    /// Returns the pose of the first camera of a frame, or `None` if it is no longer in the map.
     fn pose(&self, frame: usize) -> Option<Se3>;
 
     /// Returns an object, or `None` if it is not in the map.

@@ -97,14 +97,9 @@ impl Default for LikelihoodAssociation {
 
 #[typetag::serialize(name = "likelihood")]
 impl Association for LikelihoodAssociation {
-    fn create_associator(
-        &self,
-        camera: Camera,
-        aliases: &ClassAliases,
-        known: &[Arc<PriorObject>],
-    ) -> Box<dyn Associator> {
+    fn create_associator(&self, aliases: &ClassAliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator> {
         let (settings, aliases) = (self.clone(), aliases.clone());
-        Box::new(Tracker::new(settings, camera, aliases, known))
+        Box::new(Tracker::new(settings, aliases, known))
     }
 }
 register!(dyn Association, "likelihood", LikelihoodAssociation);

@@ -79,7 +79,8 @@ impl ObjectIdChanges {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use manifactor_quadric::BoundingBox;
+    use manifactor_quadric::{BoundingBox, Camera};
+    use manifactor_recording::camera::Cameras;
     use manifactor_recording::sequence::ClassScores;
 
     fn merge(from: u32, into: u32) -> ObjectMerge {
@@ -100,10 +101,13 @@ mod tests {
     fn a_box_that_was_moved_goes_with_its_new_object() {
         let bounding_box = BoundingBox { xmin: 0.0, ymin: 0.0, xmax: 1.0, ymax: 1.0 };
         let scores = ClassScores::default();
+        let model = Camera::new([500.0, 500.0, 320.0, 240.0], 640, 480).unwrap();
+        let camera = Cameras::new(model).first().clone();
         let detection = Detection {
             frame: 4,
             object: None,
             scores,
+            camera,
             bounding_box,
             quantities: manifactor_recording::measurement::Quantities::NONE,
         };

@@ -16,13 +16,14 @@ use std::path::Path;
 const NAME: &str = "trials.jsonl";
 
 impl JournalRecord for TrialRecord {
+    type Context = ();
     const NAME: &'static str = "record of a trial";
 
     fn write(&self) -> io::Result<String> {
         Ok(serde_json::to_string(self)?)
     }
 
-    fn read(line: &[u8]) -> Result<Self, String> {
+    fn read(line: &[u8], (): &()) -> Result<Self, String> {
         serde_json::from_slice(line).map_err(|error| error.to_string())
     }
 }
@@ -45,7 +46,7 @@ impl TrialLog {
     /// # Errors
     /// A file that cannot be read or written, is a link, or is not a log. It stays unchanged.
     pub fn open(folder: OutputFolder) -> Result<Self, JournalError> {
-        let (file, records) = Journal::open(&folder.path().join(NAME), "")?;
+        let (file, records) = Journal::open(&folder.path().join(NAME), "", ())?;
         Ok(Self { file, records: records.into_iter().map(record_with_key).collect(), _folder: folder })
     }
 

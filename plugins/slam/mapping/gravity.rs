@@ -109,7 +109,7 @@ pub(crate) mod tests {
     pub(crate) fn sequence() -> Sequence {
         let frame = |timestamp: f64| Frame::new(timestamp, Se3::identity());
         Sequence {
-            camera: Camera::new([500.0, 500.0, 320.0, 240.0], 640, 480).unwrap(),
+            cameras: Camera::new([500.0, 500.0, 320.0, 240.0], 640, 480).unwrap().into(),
             body_from_camera: None,
             frames: vec![frame(10.0), frame(11.0)],
             detections: vec![],

@@ -14,6 +14,7 @@ use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::{Prior, Se3};
 use manifactor_graph::{FactorEntry, Graph, GraphError, Key, Values, Variable};
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
+use manifactor_recording::camera::MountedCamera;
 use manifactor_recording::fusion::FusedClass;
 use manifactor_recording::measurement::MeasurementSigmas;
 use manifactor_recording::prior_map::PriorObject;
@@ -112,7 +113,7 @@ impl Mapping {
             let pose = frame.map_from_odometry.compose(&seen.world_from_camera);
             Some(StampedPose { timestamp: seen.timestamp, pose })
         };
-        let start = |measured| rejection::initial_quadric(measured, at, sequence.camera, settings);
+        let start = |measured| rejection::initial_quadric(measured, at, settings);
         let starts = measurements.objects.iter().map(start).collect();
         let decisions =
             SemanticFactors::default().complete_decisions(&measurements, starts, settings, frame.up)?;
@@ -134,7 +135,7 @@ impl Mapping {
         mapping.add_poses(sequence, settings)?;
         let all = mapping.measurements.objects.clone();
         for (measured, decision) in all.iter().zip(decisions) {
-            let object = mapping.add_object(measured, decision, sequence.camera, settings);
+            let object = mapping.add_object(measured, decision, settings);
             mapping.objects.push(object);
         }
         settings.own.add_to(&mut mapping.graph, &mut mapping.values);
@@ -178,7 +179,6 @@ impl Mapping {
         &mut self,
         measured: &ObjectMeasurements,
         decision: ObjectDecision,
-        camera: Camera,
         settings: &RunSettings,
     ) -> MappedObject {
         let key = object_key(measured.id);
@@ -189,7 +189,7 @@ impl Mapping {
                 let known = measured.prior.as_ref().map(|known| prior_object_entry(known, settings));
                 self.graph.factors_mut().extend(known);
                 let boxes = measured.views.iter();
-                let boxes = boxes.flat_map(|view| view_entries(view, &key, camera, &settings.detections));
+                let boxes = boxes.flat_map(|view| view_entries(view, &key, &settings.detections));
                 self.graph.factors_mut().extend(boxes);
                 self.graph.factors_mut().extend(verdict.entries);
                 self.values.insert(key.clone(), *start);
@@ -241,7 +241,7 @@ impl Mapping {
             plausible::trajectory_doubts(odometry).into_iter().map(|what| Warning::Implausible { what });
         self.warnings.extend(doubts);
         self.warnings.extend(jump_warnings(sequence));
-        self.warnings.extend(image_warning(sequence));
+        self.warnings.extend(image_warnings(sequence));
         let unused = sequence.unused.iter().chain(unused);
         self.warnings.extend(unused_warnings(unused, self.measurements.without_area));
         let detected = self.objects.iter().filter(|object| object.detections > 0);
@@ -273,12 +273,16 @@ const MAX_OUTSIDE_SHARE: f64 = 0.05;
 /// Normalized sides are this far outside of the image at most: centre and size of a box are rounded.
 const NORMALIZED_MARGIN: f64 = 0.01;
 
-/// Returns a warning if boxes do not fit the image of the camera.
-fn image_warning(sequence: &Sequence) -> Option<Warning> {
-    let (width, height) = (sequence.camera.width, sequence.camera.height);
+/// Returns a warning for each camera whose image its boxes do not fit.
+fn image_warnings(sequence: &Sequence) -> impl Iterator<Item = Warning> {
+    sequence.cameras.iter().filter_map(|camera| image_warning(sequence, camera))
+}
+
+fn image_warning(sequence: &Sequence, camera: &MountedCamera) -> Option<Warning> {
+    let Camera { width, height, .. } = camera.model;
     let all = || {
-        let boxes = sequence.detections.iter().map(|detection| &detection.bounding_box);
-        boxes.filter(|b| b.xmin < b.xmax && b.ymin < b.ymax)
+        let own = sequence.detections.iter().filter(|detection| detection.camera.index == camera.index);
+        own.map(|detection| &detection.bounding_box).filter(|b| b.xmin < b.xmax && b.ymin < b.ymax)
     };
     let boxes = all().count();
     let is_share = |side: f64| (-NORMALIZED_MARGIN..=1.0 + NORMALIZED_MARGIN).contains(&side);
@@ -445,22 +449,23 @@ fn jump_warnings(sequence: &Sequence) -> impl Iterator<Item = Warning> {
 pub fn view_entries<'a>(
     view: &'a ObjectBox,
     object: &'a Key,
-    camera: Camera,
     settings: &'a DetectionSettings,
 ) -> impl Iterator<Item = FactorEntry> + 'a {
     let errors = MeasurementSigmas { depth: *settings.depth_error };
-    let others = view.quantities.entries(view.frame, object, errors, settings.loss.as_ref());
-    std::iter::once(box_entry(view, object.clone(), camera, settings)).chain(others)
+    let others = view.quantities.entries(view.frame, &view.camera, object, errors, settings.loss.as_ref());
+    box_entry(view, object.clone(), settings).into_iter().chain(others)
 }
 
 /// Returns the factor of a box.
-fn box_entry(view: &ObjectBox, object: Key, camera: Camera, settings: &DetectionSettings) -> FactorEntry {
-    let (bounding_box, model) = (view.bounding_box, settings.model);
-    FactorEntry {
+fn box_entry(view: &ObjectBox, object: Key, settings: &DetectionSettings) -> Option<FactorEntry> {
+    let (bounding_box, camera, model) = (view.bounding_box, view.camera.model, settings.model);
+    let factor = Arc::new(BoundingBoxFactor { bounding_box, camera, model });
+    Some(FactorEntry {
         keys: vec![pose_key(view.frame), object],
         name: None,
-        factor: Arc::new(BoundingBoxFactor { bounding_box, camera, model }),
+        // its first variable is a pose
+        factor: view.camera.on_first(factor).ok()?,
         noise: settings.noise_of(view.inside),
         loss: settings.loss.clone(),
-    }
+    })
 }

@@ -28,7 +28,8 @@ use manifactor_mapping::mapping::{Mapping, MappingError, object_key, pose_key, r
 use manifactor_mapping::motion::MotionError;
 use manifactor_mapping::semantics::RuleError;
 use manifactor_mapping::settings::RunSettings;
-use manifactor_quadric::{Camera, DualQuadric};
+use manifactor_quadric::DualQuadric;
+use manifactor_recording::camera::Cameras;
 use manifactor_recording::sequence::{Frame, ObjectId, Observation, Sequence, SequenceHeader};
 use manifactor_smoother::{ChangeError, FactorId, Smoother, UpdateError, UpdateReport};
 use manifactor_solve::Observer;
@@ -51,7 +52,7 @@ pub struct Mapper {
     settings: Arc<RunSettings>,
     /// For the batch solve at the end.
     batch_settings: Arc<RunSettings>,
-    camera: Camera,
+    cameras: Cameras,
     /// For the poses of the body in reports.
     camera_from_body: Option<Se3>,
     smoother: Smoother,
@@ -149,10 +150,10 @@ impl Mapper {
             .iter()
             .filter_map(|measured| Some((measured.id, ObjectState::of_prior_object(measured)?)));
         Self {
-            camera: opening.camera,
+            cameras: opening.cameras.clone(),
             camera_from_body: opening.body_from_camera.map(|pose| pose.inverse()),
             smoother: Smoother::new(online),
-            associator: settings.association.create_associator(opening.camera, &settings.aliases, &known),
+            associator: settings.association.create_associator(&settings.aliases, &known),
             settings,
             batch_settings,
             id_changes: ObjectIdChanges::default(),
@@ -306,7 +307,7 @@ impl Mapper {
             Some(start) => Ok(start),
             None => {
                 let at = |i: usize| Some(StampedPose { pose: *poses.get(i)?, ..*self.live_poses.get(i)? });
-                rejection::initial_quadric(measured, at, self.camera, &self.batch_settings)
+                rejection::initial_quadric(measured, at, &self.batch_settings)
             }
         };
         let starts = self.measurements.objects.iter().map(start).collect();

@@ -8,6 +8,7 @@ pub mod __private {
     pub use {inventory, serde_json};
 }
 
+pub mod camera;
 pub mod class;
 pub mod fusion;
 pub mod keys;

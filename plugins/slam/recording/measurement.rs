@@ -4,6 +4,7 @@
 //! A type of measurement is one file: it implements [`Measurement`] and ends with `register_measurement!`.
 //! Its name becomes a field of a box in JSON lines. Its factor is added to the graph, and data association
 //! uses its innovation.
+use crate::camera::MountedCamera;
 use crate::keys::pose_key;
 use manifactor_geometry::Se3;
 use manifactor_graph::loss::Loss;
@@ -150,11 +151,12 @@ impl Quantities {
         self.iter().find_map(Measurement::depth)
     }
 
-    /// Returns the factors between a frame and an object. A measurement with invalid standard deviations is
+    /// Returns the factors between a frame and an object that `camera` sees. A measurement with invalid standard deviations is
     /// skipped and logged.
     pub fn entries<'a>(
         &'a self,
         frame: usize,
+        camera: &'a MountedCamera,
         object: &'a Key,
         errors: MeasurementSigmas,
         loss: Option<&'a Arc<dyn Loss>>,
@@ -170,7 +172,8 @@ impl Quantities {
                 tracing::warn!("`{name}` of {object} in frame {frame} is left out: {why}");
             };
             let noise = noise.inspect_err(|why| log(why)).ok()?;
-            let (keys, factor) = (vec![pose_key(frame), object.clone()], measurement.factor());
+            let factor = camera.on_first(measurement.factor()).inspect_err(|why| log(why)).ok()?;
+            let keys = vec![pose_key(frame), object.clone()];
             Some(FactorEntry { keys, name: None, factor, noise, loss: loss.cloned() })
         })
     }

@@ -1,6 +1,6 @@
 //! A sequence as files: the input of [`RecordedFiles`](crate::source::RecordedFiles).
 use crate::measurement::Measurement;
-use crate::sequence::Sequence;
+use crate::sequence::{Detection, Sequence};
 use manifactor_formats::FormatError;
 use manifactor_formats::detections::{self, DetectionRow};
 use manifactor_formats::tum::{self, StampedPose};
@@ -12,7 +12,7 @@ use std::path::Path;
 /// File of the true objects.
 pub(crate) const OBJECTS_FILE: &str = "objects.json";
 
-/// Writes `odometry.txt` and `detections.csv` into a folder, and with ground truth also `groundtruth.txt` and
+/// Writes `odometry.txt` and `detections.csv` into a folder, `detections_NAME.csv` for each further camera, and with ground truth also `groundtruth.txt` and
 /// `objects.json`. Creates the folder if it does not exist.
 ///
 /// # Errors
@@ -27,7 +27,7 @@ pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
     let odometry: Vec<_> =
         odometry.map(|f| StampedPose { timestamp: f.timestamp, pose: f.world_from_camera }).collect();
     tum::write(folder.join("odometry.txt"), &odometry)?;
-    write_detections(sequence, &folder.join("detections.csv"))?;
+    write_detections(sequence, &folder.join("detections"))?;
     if let Some(truth) = &sequence.ground_truth {
         tum::write(folder.join("groundtruth.txt"), &truth.trajectory)?;
         let path = folder.join(OBJECTS_FILE);
@@ -36,40 +36,44 @@ pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// Writes only the boxes, with the objects that they show.
+/// Writes only the boxes, with the objects that they show: `STEM.csv`, and `STEM_NAME.csv` for each further camera.
 ///
 /// # Errors
-/// If the file cannot be written.
-pub fn write_detections(sequence: &Sequence, file: &Path) -> Result<(), FormatError> {
+/// If a file cannot be written.
+pub fn write_detections(sequence: &Sequence, stem: &Path) -> Result<(), FormatError> {
     let quantities = sequence.detections.iter().flat_map(|detection| detection.quantities.iter());
     if let Some(other) = quantities.map(Measurement::name).find(|name| *name != "depth") {
         let message = format!("detections with `{other}` have no column here: use JSON lines");
         let source = io::Error::new(io::ErrorKind::Unsupported, message);
-        return Err(FormatError::Io { path: file.to_owned(), source });
+        return Err(FormatError::Io { path: stem.to_owned(), source });
     }
-    detections::write(file, &rows(sequence))
+    for camera in sequence.cameras.iter() {
+        let own = sequence.detections.iter().filter(|detection| detection.camera.index == camera.index);
+        let rows: Vec<_> = own.filter_map(|detection| row(sequence, detection)).collect();
+        let mut file = stem.as_os_str().to_owned();
+        file.push(if camera.index == 0 { ".csv".into() } else { format!("_{}.csv", camera.name) });
+        detections::write(file, &rows)?;
+    }
+    Ok(())
 }
 
-fn rows(sequence: &Sequence) -> Vec<DetectionRow> {
-    let row = |d: &crate::sequence::Detection| {
-        let (class, score) = d.scores.best().unwrap_or_default();
-        let all: Vec<_> = d.scores.iter().map(|(class, score)| format!("{class}:{score}")).collect();
-        let [xmin, ymin, xmax, ymax] = d.bounding_box.bounds();
-        Some(DetectionRow {
-            frame_idx: Some(d.frame as u64),
-            timestamp: sequence.frames.get(d.frame)?.timestamp,
-            frame_idx_as_published: None,
-            object_key: d.object.map(|id| id.0),
-            class_id: None,
-            class_name: class.to_owned(),
-            score,
-            xmin,
-            ymin,
-            xmax,
-            ymax,
-            scores: (all.len() > 1).then(|| all.join(";")),
-            depth: d.quantities.depth(),
-        })
-    };
-    sequence.detections.iter().filter_map(row).collect()
+fn row(sequence: &Sequence, detection: &Detection) -> Option<DetectionRow> {
+    let (class, score) = detection.scores.best().unwrap_or_default();
+    let all: Vec<_> = detection.scores.iter().map(|(class, score)| format!("{class}:{score}")).collect();
+    let [xmin, ymin, xmax, ymax] = detection.bounding_box.bounds();
+    Some(DetectionRow {
+        frame_idx: Some(detection.frame as u64),
+        timestamp: sequence.frames.get(detection.frame)?.timestamp,
+        frame_idx_as_published: None,
+        object_key: detection.object.map(|id| id.0),
+        class_id: None,
+        class_name: class.to_owned(),
+        score,
+        xmin,
+        ymin,
+        xmax,
+        ymax,
+        scores: (all.len() > 1).then(|| all.join(";")),
+        depth: detection.quantities.depth(),
+    })
 }

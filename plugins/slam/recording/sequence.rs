@@ -3,11 +3,12 @@
 //! Recorded and simulated data have the same form. Names of frames read from right to left:
 //! `world_from_camera` maps a point in the camera frame to the world frame. The camera looks along +z; in the
 //! image x points right and y down.
+use crate::camera::{Cameras, MountedCamera};
 use crate::measurement::Quantities;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, Noise};
-use manifactor_quadric::{BoundingBox, Box3, Camera};
+use manifactor_quadric::{BoundingBox, Box3};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -22,12 +23,12 @@ use jumps::OdometryJump;
 pub(crate) use observations::Observations;
 use pose_graph::{PoseFactor, PoseGraphChanges};
 
-/// A recording of one camera that moves among objects.
+/// A recording of one or more cameras on a body that moves among objects.
 #[derive(Debug, Clone)]
 pub struct Sequence {
-    /// Camera, shared by all frames.
-    pub camera: Camera,
-    /// Pose of the camera on the body whose odometry the source has. `None`: it is the odometry of the camera.
+    /// Cameras, shared by all frames.
+    pub cameras: Cameras,
+    /// Pose of the first camera on the body whose odometry the source has. `None`: it is the odometry of the camera.
     pub body_from_camera: Option<Se3>,
     /// Frames in strictly increasing order of time.
     pub frames: Vec<Frame>,
@@ -125,9 +126,9 @@ impl fmt::Display for DetectionsWithoutPose {
 /// Data of a recording that are known before its first frame.
 #[derive(Debug, Clone)]
 pub struct SequenceHeader {
-    /// Camera, shared by all frames.
-    pub camera: Camera,
-    /// Pose of the camera on the body whose odometry the source has. `None`: it is the odometry of the camera.
+    /// Cameras, shared by all frames.
+    pub cameras: Cameras,
+    /// Pose of the first camera on the body whose odometry the source has. `None`: it is the odometry of the camera.
     pub body_from_camera: Option<Se3>,
     /// Up direction in the odometry frame, if the source knows it.
     pub up: Option<Direction>,
@@ -151,16 +152,16 @@ pub struct Observation {
 }
 
 impl SequenceHeader {
-    /// Creates an opening with only a camera.
-    pub fn new(camera: Camera) -> Self {
-        Self { camera, body_from_camera: None, up: None, ground_truth: None }
+    /// Creates an opening with only the cameras.
+    pub fn new(cameras: impl Into<Cameras>) -> Self {
+        Self { cameras: cameras.into(), body_from_camera: None, up: None, ground_truth: None }
     }
 
     /// Converts the opening to a sequence without frames.
     pub fn into_sequence(self) -> Sequence {
-        let Self { camera, body_from_camera, up, ground_truth } = self;
+        let Self { cameras, body_from_camera, up, ground_truth } = self;
         Sequence {
-            camera,
+            cameras,
             body_from_camera,
             frames: vec![],
             detections: vec![],
@@ -184,7 +185,7 @@ impl Sequence {
     /// Returns the data that are known before the first frame.
     pub fn header(&self) -> SequenceHeader {
         SequenceHeader {
-            camera: self.camera,
+            cameras: self.cameras.clone(),
             body_from_camera: self.body_from_camera,
             up: self.up,
             ground_truth: self.ground_truth.clone(),
@@ -240,6 +241,8 @@ pub struct Detection {
     pub object: Option<ObjectId>,
     /// Class scores of the detector.
     pub scores: ClassScores,
+    /// The camera of the image.
+    pub camera: Arc<MountedCamera>,
     /// Box in the image. Unit: pixels.
     pub bounding_box: BoundingBox,
     /// Measurements in addition to the box.

@@ -15,6 +15,7 @@ mod json_lines;
 mod mcap;
 mod recorded;
 mod rectification;
+mod rig;
 pub mod stream;
 mod tum;
 
@@ -22,9 +23,9 @@ pub use camera::{CalibrationFile, CameraChoice};
 pub use detections::DetectionsFile;
 pub use interpolation::NoPose;
 pub use json_lines::parse;
-pub use json_lines::{JsonLines, format_line};
+pub use json_lines::{FurtherCamera, JsonLines, format_line};
 pub use mcap::{Mcap, McapError};
-pub use recorded::RecordedFiles;
+pub use recorded::{FurtherRecordedCamera, RecordedFiles};
 pub use stream::FrameStream;
 pub use tum::TumRgbd;
 
@@ -240,6 +241,12 @@ pub enum SourceError {
         frame: usize,
         /// Sides xmin, ymin, xmax, ymax. Unit: pixels.
         bounds: [f64; 4],
+    },
+    /// A further camera whose name cannot be part of a file's name.
+    #[error("`source.cameras` has the name {name:?}: expected letters, digits, `_` and `-`")]
+    CameraName {
+        /// The name.
+        name: String,
     },
     /// A camera model together with a separate distortion.
     #[error(

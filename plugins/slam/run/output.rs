@@ -6,7 +6,8 @@
 //! - `trajectory.txt`: the trajectory in TUM's format; `live.txt` for a stream, with each pose as estimated
 //!   when its frame arrived; `body_trajectory.txt` with the poses of the body, if the source has
 //!   `body_from_camera`
-//! - `detections.csv`: the boxes with their objects, if data association was done
+//! - `detections.csv`: the boxes with their objects, if data association was done; `detections_NAME.csv` for a further
+//!   camera
 //! - `objects.json`: the objects
 //! - `frames.jsonl`: poses and boxes, one frame per line
 //! - `graph.json`: the literal graph at the estimate
@@ -143,7 +144,7 @@ pub fn write_variant(
         write_whole(&file("live.txt"), tum::format(&online.live))?;
     }
     if report.association.is_some() {
-        recording::write_detections(&estimate.sequence, &file("detections.csv"))?;
+        recording::write_detections(&estimate.sequence, &file("detections"))?;
     }
     write_document(&file("objects.json"), format_results(&report.objects))?;
     write_document(&file("frames.jsonl"), lines(&record.frames))?;

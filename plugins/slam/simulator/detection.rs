@@ -5,11 +5,13 @@ use super::scene::SceneObject;
 use super::solid::ImageBoxes;
 use super::{SimulatedSource, catalogue, noise};
 use manifactor_geometry::Se3;
-use manifactor_quadric::BoundingBox;
+use manifactor_quadric::{BoundingBox, Camera};
+use manifactor_recording::camera::MountedCamera;
 use manifactor_recording::measurement::Quantities;
 use manifactor_recording::sequence::{ClassScores, Detection};
-use rand::RngExt;
+use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use std::sync::Arc;
 
 /// Random number streams of a detector's errors, and the errors that persist.
 pub(super) struct DetectorErrors {
@@ -21,6 +23,11 @@ pub(super) struct DetectorErrors {
 }
 
 impl DetectorErrors {
+    pub(super) fn draw(objects: usize, rng: &mut Pcg64) -> Self {
+        let [boxes, mistakes, depths] = [(); 3].map(|()| Pcg64::from_rng(rng));
+        Self::new(objects, boxes, mistakes, depths)
+    }
+
     pub(super) fn new(objects: usize, boxes: Pcg64, mistakes: Pcg64, depths: Pcg64) -> Self {
         Self { boxes, mistakes, depths, lasting: vec![([0.0; 4], f64::INFINITY); objects] }
     }
@@ -28,6 +35,7 @@ impl DetectorErrors {
 
 /// Camera pose of an image, and its depth image if objects hide each other.
 struct ImageView<'a> {
+    camera: &'a Camera,
     pose: &'a Se3,
     depths: Option<DepthImage>,
 }
@@ -41,11 +49,12 @@ struct SimulatedBox {
 }
 
 impl SimulatedSource {
-    /// Returns all boxes, image by image. The first `errors` apply to objects in their first place, and the
+    /// Returns all boxes in the images of a camera, image by image. `poses` are those of the first camera. The first `errors` apply to objects in their first place, and the
     /// second to objects that have been moved.
     pub(super) fn detect(
         &self,
         scene: &Scene,
+        camera: &Arc<MountedCamera>,
         poses: &[Se3],
         [mut before, mut after]: [DetectorErrors; 2],
         imagination: &mut Pcg64,
@@ -61,12 +70,12 @@ impl SimulatedSource {
             usual.push(if wrong { other } else { object.truth.class.as_str() });
         }
         let mut detections = vec![];
-        for (frame, pose) in poses.iter().enumerate() {
+        for (frame, pose) in poses.iter().map(|pose| camera.pose(pose)).enumerate() {
             let time = frame as f64 * *self.trajectory.interval;
             let there = (0..usual.len()).map(|i| scene.object_at(i, time));
             let solids = there.map(|o| (&o.solid, pose.between(&o.truth.world_from_object)));
-            let depths = self.detector.occluded_by_objects.then(|| DepthImage::new(solids, &self.camera));
-            let view = ImageView { pose, depths };
+            let depths = self.detector.occluded_by_objects.then(|| DepthImage::new(solids, &camera.model));
+            let view = ImageView { camera: &camera.model, pose: &pose, depths };
             for (i, object) in scene.objects.iter().enumerate() {
                 let class = (usual[i], classes.as_slice());
                 // an object draws noise even after it has moved away, so that a move changes only its own
@@ -78,13 +87,15 @@ impl SimulatedSource {
                 if let Some(SimulatedBox { bounding_box, scores, quantities, assigned_to: taken_for }) = seen
                 {
                     let object = Some(scene.object_at(taken_for, time).truth.id);
-                    detections.push(Detection { frame, object, scores, bounding_box, quantities });
+                    let camera = camera.clone();
+                    detections.push(Detection { frame, object, scores, camera, bounding_box, quantities });
                 }
             }
-            for (bounding_box, scores) in self.detector.draw_false_boxes(&self.camera, &classes, imagination)
+            for (bounding_box, scores) in self.detector.draw_false_boxes(&camera.model, &classes, imagination)
             {
                 let quantities = Quantities::NONE;
-                detections.push(Detection { frame, object: None, scores, bounding_box, quantities });
+                let camera = camera.clone();
+                detections.push(Detection { frame, object: None, scores, camera, bounding_box, quantities });
             }
         }
         detections
@@ -104,12 +115,12 @@ impl SimulatedSource {
         let (noise, seconds) = &mut lasting[i];
         *seconds += *self.trajectory.interval;
         let world_from_object = &object.truth.world_from_object;
-        let ImageBoxes { whole, inside } = object.solid.boxes(world_from_object, &self.camera, view.pose)?;
+        let ImageBoxes { whole, inside } = object.solid.boxes(world_from_object, view.camera, view.pose)?;
         let left = view.depths.as_ref().map_or(Some((inside, 1.0)), |depths| depths.visible_part(i, inside));
         // a hidden object draws noise as well, so that a setting changes only its own effect
         let (seen, share) = left.unwrap_or((inside, 0.0));
         let visible = share * inside.area() / whole.area();
-        let drawn = self.detector.draw_box(&seen, visible, &self.camera, (noise, *seconds), boxes);
+        let drawn = self.detector.draw_box(&seen, visible, view.camera, (noise, *seconds), boxes);
         *seconds = 0.0;
         let scores = self.detector.draw_class(usual, classes, boxes);
         let taken_for = noise::draw_assigned_object(*self.detector.wrong_object, i, objects, mistakes);

@@ -3,14 +3,17 @@
 //! It simulates a scene of solids, a camera that moves around them, and noisy odometry and boxes. Scene,
 //! trajectory and noise have separate seeds. Equal settings give equal bits.
 use manifactor_formats::tum::StampedPose;
+use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::Camera;
+use manifactor_recording::camera::Cameras;
 use manifactor_recording::sequence::{Acceleration, Frame, GroundTruth, Sequence};
 use manifactor_recording::source::{InputFolders, SequenceSource, SourceError};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 mod catalogue;
 mod detection;
@@ -48,6 +51,9 @@ pub struct SimulatedSource {
     pub seed: u64,
     /// The camera. Default: the camera of the paper.
     pub camera: Camera,
+    /// Further cameras on the same body, by name.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub cameras: BTreeMap<String, SimulatedCamera>,
     /// Objects of the scene.
     pub scene: SceneSettings,
     /// Motion of the camera.
@@ -68,6 +74,7 @@ impl Default for SimulatedSource {
         Self {
             seed: 1,
             camera,
+            cameras: BTreeMap::new(),
             scene: SceneSettings::default(),
             trajectory: TrajectorySettings::default(),
             odometry: MotionNoise::default(),
@@ -75,6 +82,17 @@ impl Default for SimulatedSource {
             accelerometer: None,
         }
     }
+}
+
+/// A further camera on the body.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SimulatedCamera {
+    /// The camera.
+    pub camera: Camera,
+    /// Pose of the camera in the frame of the first camera: the translation in metres, and the rotation as a unit
+    /// quaternion (x, y, z, w).
+    pub body_from_camera: Se3,
 }
 
 /// Error that prevents a simulation.
@@ -132,9 +150,17 @@ impl SimulatedSource {
         let [mut imagination, mistakes, mut felt, depths] = [(); 4].map(|()| Pcg64::from_rng(&mut noise));
         let count = scene.objects.len();
         let before = DetectorErrors::new(count, boxes, mistakes, depths);
-        let [boxes, mistakes, depths] = [(); 3].map(|()| Pcg64::from_rng(&mut noise));
-        let after = DetectorErrors::new(count, boxes, mistakes, depths);
-        let detections = self.detect(&scene, &poses, [before, after], &mut imagination);
+        let after = DetectorErrors::draw(count, &mut noise);
+        let mut cameras = Cameras::new(self.camera);
+        for (name, further) in &self.cameras {
+            cameras.add(name, further.camera, further.body_from_camera);
+        }
+        let mut detections = self.detect(&scene, cameras.first(), &poses, [before, after], &mut imagination);
+        for camera in cameras.iter().skip(1) {
+            let errors = [(); 2].map(|()| DetectorErrors::draw(count, &mut noise));
+            detections.extend(self.detect(&scene, camera, &poses, errors, &mut imagination));
+        }
+        detections.sort_by_key(|detection| detection.frame);
         let readings = self.accelerometer.as_ref().map(|sensor| {
             let readings = sensor.read(&poses, *self.trajectory.interval, &mut felt).into_iter().enumerate();
             readings.map(|(i, acceleration)| Acceleration { timestamp: time(i), acceleration }).collect()
@@ -144,7 +170,7 @@ impl SimulatedSource {
             objects: scene.true_objects(time(poses.len() - 1)),
         };
         Ok(Sequence {
-            camera: self.camera,
+            cameras,
             body_from_camera: None,
             frames,
             detections,

@@ -3,7 +3,6 @@ use crate::prior_map::RelocalizationLog;
 use crate::tum::{data, document};
 use manifactor_config::{Document, Format};
 use manifactor_graph::checked::Positive;
-use manifactor_quadric::Camera;
 use manifactor_slam::association::{
     Association, Associator, Corrections, FrameDetections, GivenAssociation, LikelihoodAssociation,
 };
@@ -137,7 +136,7 @@ impl WrongEverySecondFrame {
 
 #[typetag::serialize(name = "twofold")]
 impl Association for WrongEverySecondFrame {
-    fn create_associator(&self, _: Camera, _: &ClassAliases, _: &[Arc<PriorObject>]) -> Box<dyn Associator> {
+    fn create_associator(&self, _: &ClassAliases, _: &[Arc<PriorObject>]) -> Box<dyn Associator> {
         Box::new(self.clone())
     }
 }

@@ -265,6 +265,7 @@ fn rejected_boxes_are_reported_and_the_pose_is_accepted() {
     let far = Detection {
         frame: 0,
         object: Some(ObjectId(id)),
+        camera: sequence.cameras.first().clone(),
         scores: ClassScores::single("cup", 0.5),
         // its square is infinite
         quantities: Quantities::NONE,

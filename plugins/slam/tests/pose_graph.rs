@@ -481,7 +481,7 @@ fn a_faulty_field_of_a_line_is_reported_and_the_frames_around_it_stay() {
         let (mut messages, mut accepted) = (vec![], 0);
         for (i, line) in lines.iter().enumerate() {
             let line = if i == place { &faulty } else { line };
-            match parse(line.as_bytes()).map(|frame| mapper.add_frame(&frame)) {
+            match parse(line.as_bytes(), &sequence.cameras).map(|frame| mapper.add_frame(&frame)) {
                 Ok(Ok(report)) => {
                     accepted += 1;
                     messages.extend(report.refused);

@@ -56,7 +56,7 @@ fn load(name: &str) -> Sequence {
 /// Scores of the associations at arrival, at the end, and after a final reconsideration.
 fn scores(settings: &LikelihoodAssociation, sequence: &Sequence) -> [IdentityScores; 3] {
     let map = Odometry(sequence);
-    let mut associator = settings.create_associator(sequence.camera, &ClassAliases::default(), &[]);
+    let mut associator = settings.create_associator(&ClassAliases::default(), &[]);
     let (mut names, mut then) = (ObjectIdChanges::default(), vec![]);
     let frames: Vec<_> = sequence.observations().collect();
     let image = |frame: usize| {

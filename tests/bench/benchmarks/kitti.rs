@@ -85,6 +85,7 @@ pub(super) fn run(arguments: Arguments) -> BenchmarkResult {
     let (poses, labels) = (poses(&read("orbslam3_poses")), labels(&read("label_02")));
     let still = still(&labels, &poses);
     let mut recorded = SequenceHeader::new(CAMERA).into_sequence();
+    let camera = recorded.cameras.first().clone();
     let frame = |(i, pose): (usize, &Se3)| Frame::new(i as f64 * INTERVAL, *pose);
     recorded.frames = poses.iter().enumerate().map(frame).collect();
     let mut named = 0;
@@ -104,6 +105,7 @@ pub(super) fn run(arguments: Arguments) -> BenchmarkResult {
             frame,
             object,
             scores,
+            camera: camera.clone(),
             bounding_box,
             quantities: Positive::new(n[12])
                 .map_or(Quantities::NONE, |z| Quantities::one(DepthMeasurement(z))),

@@ -5,6 +5,7 @@ use manifactor::geometry::{Se3, So3};
 use manifactor::graph::checked::Positive;
 use manifactor::nalgebra::Vector3;
 use manifactor::quadric::BoundingBox;
+use manifactor::slam::camera::Cameras;
 use manifactor::slam::measurement::{DepthMeasurement, Quantities};
 use manifactor::slam::online::Mapper;
 use manifactor::slam::output::map_of;
@@ -106,6 +107,7 @@ fn observations(text: &str) -> Vec<Observation> {
                     frame: 0,
                     object: word(1).parse().ok().map(ObjectId),
                     scores: ClassScores::single(word(7), number(6)),
+                    camera: Cameras::new(super::stream::camera()).first().clone(),
                     bounding_box: BoundingBox { xmin, ymin, xmax, ymax },
                     quantities: word(8)
                         .parse()

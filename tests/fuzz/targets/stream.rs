@@ -9,7 +9,7 @@ use manifactor::slam::source::{
     CameraChoice, InputFolders, JsonLines, SequenceSource, SourceError, format_line,
 };
 use manifactor::slam::stream::FrameStream;
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
 /// Reads lines of JSON. Each line is a frame or an error with its line number, and written frames are read
@@ -112,6 +112,7 @@ fn lines(folder: &Path, bytes: &[u8]) -> Vec<Result<Observation, SourceError>> {
     std::fs::write(folder.join(file), bytes).unwrap_or_else(|e| panic!("{e}"));
     let source = JsonLines {
         body_from_camera: None,
+        cameras: BTreeMap::new(),
         camera: CameraChoice::Pinhole(camera()),
         file: Some(file.into()),
         ground_truth: None,

@@ -91,8 +91,8 @@ impl BoxNoise {
 impl ObjectPrior {
     /// Returns the prior of an object seen once, at `depth` metres, with the standard deviation `spread` of
     /// its logarithm.
-    pub(super) fn new(seen: &PosedDetection, camera: &Camera, depth: f64, spread: f64) -> Self {
-        let b = &seen.bounding_box;
+    pub(super) fn new(seen: &PosedDetection, depth: f64, spread: f64) -> Self {
+        let (b, camera) = (&seen.bounding_box, &seen.camera.model);
         let ray = camera.ray(b.centre());
         let eye = seen.world_from_camera.translation;
         let centre = seen.world_from_camera.act(&(ray * depth));
@@ -184,16 +184,15 @@ pub(super) fn fit(
     belief: &ObjectPrior,
     start: DualQuadric,
     seen: &[PosedDetection],
-    camera: &Camera,
     noise: &BoxNoise,
 ) -> Option<FittedEllipsoid> {
     let (mut quadric, mut damping) = (start, 1e-3);
-    let mut system = NormalEquations::new(belief, &quadric, seen, camera, noise);
+    let mut system = NormalEquations::new(belief, &quadric, seen, noise);
     for _ in 0..MAX_STEPS {
         let damped = system.h + Matrix9::from_diagonal(&system.h.diagonal()) * damping;
         let step = -Cholesky::new(damped)?.solve(&system.gradient);
         let next = quadric.retract(&step);
-        let there = NormalEquations::new(belief, &next, seen, camera, noise);
+        let there = NormalEquations::new(belief, &next, seen, noise);
         if there.cost >= system.cost {
             damping *= 10.0;
             continue;
@@ -217,17 +216,11 @@ struct NormalEquations {
 }
 
 impl NormalEquations {
-    fn new(
-        belief: &ObjectPrior,
-        quadric: &DualQuadric,
-        seen: &[PosedDetection],
-        camera: &Camera,
-        noise: &BoxNoise,
-    ) -> Self {
+    fn new(belief: &ObjectPrior, quadric: &DualQuadric, seen: &[PosedDetection], noise: &BoxNoise) -> Self {
         let (r, j) = belief.rows(quadric);
         let mut all = Self { cost: r.norm_squared(), gradient: j.tr_mul(&r), h: j.tr_mul(&j) };
         for seen in seen {
-            match WhitenedResidual::new(quadric, seen, camera, noise) {
+            match WhitenedResidual::new(quadric, seen, noise) {
                 None => all.cost += INVISIBLE_COST,
                 Some(whitened) => {
                     // Cauchy's loss of a detection as a whole
@@ -258,8 +251,8 @@ struct WhitenedResidual {
 
 impl WhitenedResidual {
     /// Returns `None` if the ellipsoid has no box in this image.
-    fn new(quadric: &DualQuadric, seen: &PosedDetection, camera: &Camera, noise: &BoxNoise) -> Option<Self> {
-        let predicted = predict(&seen.world_from_camera, quadric, camera)?;
+    fn new(quadric: &DualQuadric, seen: &PosedDetection, noise: &BoxNoise) -> Option<Self> {
+        let predicted = predict(&seen.world_from_camera, quadric, &seen.camera.model)?;
         let mut all = Self { square: 0.0, gradient: Vector9::zeros(), h: Matrix9::zeros() };
         all.add(
             predicted.error(&seen.bounding_box),
@@ -285,19 +278,15 @@ impl WhitenedResidual {
 }
 
 /// Returns the squared whitened residual of a detection under Cauchy's loss.
-pub(super) fn squared_error(
-    quadric: &DualQuadric,
-    seen: &PosedDetection,
-    camera: &Camera,
-    noise: &BoxNoise,
-) -> f64 {
-    let error = WhitenedResidual::new(quadric, seen, camera, noise);
+pub(super) fn squared_error(quadric: &DualQuadric, seen: &PosedDetection, noise: &BoxNoise) -> f64 {
+    let error = WhitenedResidual::new(quadric, seen, noise);
     error.map_or(INVISIBLE_COST, |error| CAUCHY_SCALE_SQUARED * (error.square / CAUCHY_SCALE_SQUARED).ln_1p())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use manifactor_recording::camera::Cameras;
     use manifactor_recording::measurement::Quantities;
     use nalgebra::Vector2;
 
@@ -309,7 +298,8 @@ mod tests {
     fn detection_at(x: f64, frame: usize, quadric: &DualQuadric) -> PosedDetection {
         let world_from_camera = Se3 { translation: Vector3::x() * x, ..Se3::identity() };
         let bounding_box = predict(&world_from_camera, quadric, &CAMERA).unwrap().bounding_box;
-        PosedDetection { frame, world_from_camera, bounding_box, quantities: Quantities::NONE }
+        let camera = Cameras::new(CAMERA).first().clone();
+        PosedDetection { frame, camera, world_from_camera, bounding_box, quantities: Quantities::NONE }
     }
 
     fn ball(z: f64) -> DualQuadric {
@@ -320,8 +310,8 @@ mod tests {
     #[test]
     fn one_box_says_all_but_the_depth() {
         let first = detection_at(0.0, 0, &ball(2.0));
-        let belief = ObjectPrior::new(&first, &CAMERA, 3.0, 0.5);
-        let found = fit(&belief, belief.initial_quadric(), &[first], &CAMERA, &NOISE).unwrap();
+        let belief = ObjectPrior::new(&first, 3.0, 0.5);
+        let found = fit(&belief, belief.initial_quadric(), &[first], &NOISE).unwrap();
         let away = found.quadric.centroid();
         assert!((away.z - 3.0).abs() < 0.1, "{away}");
         let ray = CAMERA.ray(Vector2::new(345.0, 240.0)) * 3.0;
@@ -334,17 +324,17 @@ mod tests {
     fn boxes_from_the_side_say_the_depth() {
         let detections: Vec<_> =
             (0..8).map(|i| detection_at(0.1 * f64::from(i), i as usize, &ball(2.0))).collect();
-        let belief = ObjectPrior::new(&detections[0], &CAMERA, 3.0, 0.5);
-        let found = fit(&belief, belief.initial_quadric(), &detections, &CAMERA, &NOISE).unwrap();
+        let belief = ObjectPrior::new(&detections[0], 3.0, 0.5);
+        let found = fit(&belief, belief.initial_quadric(), &detections, &NOISE).unwrap();
         assert!((found.quadric.centroid() - ball(2.0).centroid()).norm() < 0.1, "{}", found.quadric);
         assert!(found.covariance[(5, 5)].sqrt() < 0.15);
-        assert!(squared_error(&found.quadric, &detections[7], &CAMERA, &NOISE) < 1.0);
-        assert!(squared_error(&ball(4.0), &detections[7], &CAMERA, &NOISE) > 10.0);
+        assert!(squared_error(&found.quadric, &detections[7], &NOISE) < 1.0);
+        assert!(squared_error(&ball(4.0), &detections[7], &NOISE) > 10.0);
     }
 
     #[test]
     fn derivatives_of_a_belief_are_right() {
-        let belief = ObjectPrior::new(&detection_at(0.0, 0, &ball(2.0)), &CAMERA, 3.0, 0.5);
+        let belief = ObjectPrior::new(&detection_at(0.0, 0, &ball(2.0)), 3.0, 0.5);
         check_derivatives(&belief);
         let covariance = Matrix9::from_fn(|r, c| if r == c { 0.04 } else { 0.01 });
         check_derivatives(&ObjectPrior::from_estimate(&FittedEllipsoid { quadric: ball(2.0), covariance }));

@@ -5,7 +5,6 @@ use super::fit::{FittedEllipsoid, fit, squared_error};
 use super::posed_detections::{PosedDetection, PosedDetections};
 use super::track::{Track, TrackBox};
 use super::tracker::Tracker;
-use manifactor_quadric::Camera;
 use manifactor_recording::sequence::ObjectId;
 
 /// The result of merging two objects.
@@ -16,9 +15,9 @@ struct MergedTrack {
     error: f64,
 }
 
-/// Two objects visible in one frame are distinct. This share of the frames of the object with fewer boxes is
+/// Two objects visible in one image are distinct. This share of the images of the object with fewer boxes is
 /// tolerated.
-const MAX_SHARED_FRAMES: f64 = 0.05;
+const MAX_SHARED_IMAGES: f64 = 0.05;
 /// Distance of the centres at which two objects may still be one, in standard deviations. Their sizes are
 /// added to it.
 const MAX_CENTRE_DISTANCE_SIGMA: f64 = 3.0;
@@ -66,7 +65,7 @@ impl Tracker {
         let own = self.track_index(id)?;
         let merges = self.neighbours(own).into_iter().filter_map(|other| {
             let (one, two) = (&self.tracks[own], &self.tracks[other]);
-            Some((other, try_merge(one, two, &self.camera, &self.settings)?))
+            Some((other, try_merge(one, two, &self.settings)?))
         });
         let (other, merged) = merges.min_by(|(_, a), (_, b)| a.error.total_cmp(&b.error))?;
         let gone = if merged.track.id == id { other } else { own };
@@ -95,19 +94,14 @@ impl Tracker {
 fn gap(one: &Track, two: &Track) -> Option<f64> {
     let apart = (one.fitted.quadric.centroid() - two.fitted.quadric.centroid()).norm();
     let gap = apart / (one.size_sum(two) + MAX_CENTRE_DISTANCE_SIGMA * one.offset_sigma(two));
-    let together = || shared_frames(&one.boxes, &two.boxes) as f64;
-    (gap <= 1.0 && together() <= MAX_SHARED_FRAMES * one.boxes.len().min(two.boxes.len()) as f64)
+    let together = || shared_images(&one.boxes, &two.boxes) as f64;
+    (gap <= 1.0 && together() <= MAX_SHARED_IMAGES * one.boxes.len().min(two.boxes.len()) as f64)
         .then_some(gap)
 }
 
 /// Merges two objects if one ellipsoid explains all boxes. Keeps the id of the object from the prior map,
 /// else of the one with more boxes.
-fn try_merge(
-    one: &Track,
-    two: &Track,
-    camera: &Camera,
-    settings: &LikelihoodAssociation,
-) -> Option<MergedTrack> {
+fn try_merge(one: &Track, two: &Track, settings: &LikelihoodAssociation) -> Option<MergedTrack> {
     let rank = |track: &Track| (track.is_known(), track.boxes.len());
     let (more, fewer) = if rank(one) >= rank(two) { (one, two) } else { (two, one) };
     let (noise, mut detections) = (settings.noise(), more.detections.merged_with(&fewer.detections));
@@ -116,16 +110,16 @@ fn try_merge(
         let mut fitted = start.fitted;
         // the way from the ellipsoid of one object to the common one may be long
         for _ in 0..2 {
-            fitted = fit(&more.belief, fitted.quadric, detections.all(), camera, &noise)?;
+            fitted = fit(&more.belief, fitted.quadric, detections.all(), &noise)?;
         }
         Some(fitted)
     });
     let cost = |fitted: &FittedEllipsoid| -> f64 {
-        detections.all().iter().map(|seen| squared_error(&fitted.quadric, seen, camera, &noise)).sum()
+        detections.all().iter().map(|seen| squared_error(&fitted.quadric, seen, &noise)).sum()
     };
     let fitted = starts.min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
     let error_of = |detections: &PosedDetections| {
-        let error = |seen: &PosedDetection| squared_error(&fitted.quadric, seen, camera, &noise);
+        let error = |seen: &PosedDetection| squared_error(&fitted.quadric, seen, &noise);
         let all = detections.all();
         let rows: usize = all.iter().map(PosedDetection::rows).sum();
         all.iter().map(error).sum::<f64>() / rows.max(1) as f64
@@ -146,12 +140,12 @@ fn try_merge(
         *track.votes.entry(class.clone()).or_default() += votes;
     }
     track.boxes.extend_from_slice(&fewer.boxes);
-    track.boxes.sort_by_key(TrackBox::frame);
-    track.boxes.dedup_by_key(|seen| seen.frame());
+    track.boxes.sort_by_key(TrackBox::image);
+    track.boxes.dedup_by_key(|seen| seen.image());
     track.last_seen_s = more.last_seen_s.into_iter().chain(fewer.last_seen_s).reduce(f64::max);
     track.next_merge_check = track.next_merge_check.max(fewer.next_merge_check);
     detections.thin(&fitted.quadric.centroid());
-    track.fitted = fit(&more.belief, fitted.quadric, detections.all(), camera, &noise)?;
+    track.fitted = fit(&more.belief, fitted.quadric, detections.all(), &noise)?;
     track.detections = detections;
     Some(MergedTrack { track, error })
 }
@@ -161,8 +155,8 @@ fn class_similarity(one: &Track, two: &Track) -> f64 {
     one.votes.keys().map(|class| (one.class_share(class) * two.class_share(class)).sqrt()).sum()
 }
 
-/// Returns the number of frames that show both objects.
-fn shared_frames(one: &[TrackBox], two: &[TrackBox]) -> usize {
-    let has = |seen: &&TrackBox| two.binary_search_by_key(&seen.frame(), TrackBox::frame).is_ok();
+/// Returns the number of images that show both objects.
+fn shared_images(one: &[TrackBox], two: &[TrackBox]) -> usize {
+    let has = |seen: &&TrackBox| two.binary_search_by_key(&seen.image(), TrackBox::image).is_ok();
     one.iter().filter(has).count()
 }

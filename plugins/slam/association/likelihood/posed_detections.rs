@@ -3,13 +3,16 @@ use super::super::MapEstimate;
 use super::fit::SIDES;
 use manifactor_geometry::Se3;
 use manifactor_quadric::BoundingBox;
+use manifactor_recording::camera::MountedCamera;
 use manifactor_recording::measurement::Quantities;
 use nalgebra::Vector3;
+use std::sync::Arc;
 
 /// A box with the camera pose that it was seen from.
 #[derive(Debug, Clone)]
 pub(super) struct PosedDetection {
     pub frame: usize,
+    pub camera: Arc<MountedCamera>,
     pub world_from_camera: Se3,
     pub bounding_box: BoundingBox,
     /// Further measurements of the detection.
@@ -60,9 +63,9 @@ impl PosedDetections {
         self.thin(centre);
     }
 
-    /// Removes the detection of a frame.
-    pub(super) fn remove(&mut self, frame: usize) {
-        self.0.retain(|detection| detection.frame != frame);
+    /// Removes the detection of an image.
+    pub(super) fn remove(&mut self, (frame, camera): (usize, usize)) {
+        self.0.retain(|detection| (detection.frame, detection.camera.index) != (frame, camera));
     }
 
     /// Returns the detections of both, in the order of frames.
@@ -89,7 +92,7 @@ impl PosedDetections {
     pub(super) fn update_poses(&mut self, map: &dyn MapEstimate) {
         for detection in &mut self.0 {
             if let Some(pose) = map.pose(detection.frame) {
-                detection.world_from_camera = pose;
+                detection.world_from_camera = detection.camera.pose(&pose);
             }
         }
     }

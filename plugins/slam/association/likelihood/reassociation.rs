@@ -62,7 +62,8 @@ impl Tracker {
         for (moved, taken) in all.iter().zip(taken) {
             let Some(track) = self.tracks.iter_mut().find(|track| track.id == moved.into) else { continue };
             track.add_class_vote(&moved.detection.scores, &self.aliases, 1.0);
-            let place = track.boxes.binary_search_by_key(&moved.frame, TrackBox::frame);
+            let image = (moved.frame, moved.detection.camera.index);
+            let place = track.boxes.binary_search_by_key(&image, TrackBox::image);
             if let (Some(seen), Err(place)) = (taken, place) {
                 track.boxes.insert(place, seen);
             }
@@ -79,8 +80,8 @@ impl Tracker {
         let is_it = |seen: &TrackBox| seen.frame() == moved.frame && seen.index == moved.index;
         let place = track.boxes.iter().position(is_it)?;
         let seen = track.boxes.remove(place);
-        track.detections.remove(moved.frame);
-        track.refit(&self.camera, &self.settings.noise());
+        track.detections.remove(seen.image());
+        track.refit(&self.settings.noise());
         Some(seen)
     }
 }

@@ -25,7 +25,7 @@ pub(super) struct Track {
     pub belief: ObjectPrior,
     pub fitted: FittedEllipsoid,
     pub detections: PosedDetections,
-    /// All its boxes, at most one per frame, in order.
+    /// All its boxes, at most one per image, in order.
     pub boxes: Vec<TrackBox>,
     /// Time of the last detection, in seconds.
     pub last_seen_s: Option<f64>,
@@ -70,10 +70,9 @@ impl Track {
         id: ObjectId,
         belief: ObjectPrior,
         first: &PosedDetection,
-        camera: &Camera,
         noise: &BoxNoise,
     ) -> Option<Self> {
-        let fitted = fit(&belief, belief.initial_quadric(), std::slice::from_ref(first), camera, noise)?;
+        let fitted = fit(&belief, belief.initial_quadric(), std::slice::from_ref(first), noise)?;
         Some(Self::without_boxes(id, belief, fitted))
     }
 
@@ -173,30 +172,24 @@ impl Track {
     }
 
     /// Returns the intersection over union of a box with the projection of the ellipsoid.
-    pub(super) fn overlap(&self, detection: &PosedDetection, camera: &Camera) -> f64 {
+    pub(super) fn overlap(&self, detection: &PosedDetection) -> f64 {
+        let camera = &detection.camera.model;
         let predicted = predict(&detection.world_from_camera, &self.fitted.quadric, camera);
         predicted.map_or(0.0, |predicted| predicted.bounding_box.iou(&detection.bounding_box))
     }
 
     /// Adds a box. If the fit fails, the ellipsoid stays unchanged.
-    pub(super) fn add_box(
-        &mut self,
-        seen: TrackBox,
-        pose: Se3,
-        map: &dyn MapEstimate,
-        camera: &Camera,
-        noise: &BoxNoise,
-    ) {
+    pub(super) fn add_box(&mut self, seen: TrackBox, pose: Se3, map: &dyn MapEstimate, noise: &BoxNoise) {
         self.last_seen_s = Some(seen.timestamp);
         self.detections.update_poses(map);
-        self.detections.add(seen.from(pose), &self.fitted.quadric.centroid());
+        self.detections.add(seen.from(&pose), &self.fitted.quadric.centroid());
         self.boxes.push(seen);
-        self.refit(camera, noise);
+        self.refit(noise);
     }
 
     /// Fits the ellipsoid to the detections, from the current one.
-    pub(super) fn refit(&mut self, camera: &Camera, noise: &BoxNoise) {
-        let fitted = fit(&self.belief, self.fitted.quadric, self.detections.all(), camera, noise);
+    pub(super) fn refit(&mut self, noise: &BoxNoise) {
+        let fitted = fit(&self.belief, self.fitted.quadric, self.detections.all(), noise);
         self.fitted = fitted.unwrap_or(self.fitted);
     }
 
@@ -223,10 +216,16 @@ impl TrackBox {
         self.detection.frame
     }
 
-    /// Returns the detection with the given camera pose.
-    pub(super) fn from(&self, world_from_camera: Se3) -> PosedDetection {
-        let Detection { frame, bounding_box, ref quantities, .. } = self.detection;
-        PosedDetection { frame, world_from_camera, bounding_box, quantities: quantities.clone() }
+    /// Returns the frame and the index of the camera.
+    pub(super) fn image(&self) -> (usize, usize) {
+        (self.detection.frame, self.detection.camera.index)
+    }
+
+    /// Returns the detection with the pose of its camera, from the pose of its frame.
+    pub(super) fn from(&self, world_from_first: &Se3) -> PosedDetection {
+        let Detection { frame, ref camera, bounding_box, ref quantities, .. } = self.detection;
+        let (world_from_camera, camera) = (camera.pose(world_from_first), camera.clone());
+        PosedDetection { frame, camera, world_from_camera, bounding_box, quantities: quantities.clone() }
     }
 }
 

@@ -6,7 +6,6 @@ use super::posed_detections::PosedDetection;
 use super::reassociation::PendingFrame;
 use super::track::{Track, TrackBox};
 use manifactor_geometry::Se3;
-use manifactor_quadric::Camera;
 use manifactor_recording::class::ClassAliases;
 use manifactor_recording::prior_map::PriorObject;
 use manifactor_recording::sequence::{Detection, ObjectId};
@@ -32,7 +31,6 @@ const KNOWN_RELATIVE_SIGMA: f64 = 0.15;
 #[derive(Debug)]
 pub(super) struct Tracker {
     pub settings: LikelihoodAssociation,
-    pub camera: Camera,
     pub aliases: ClassAliases,
     /// Sorted by id at the front: the objects of a prior map.
     pub tracks: Vec<Track>,
@@ -63,9 +61,12 @@ impl Associator for Tracker {
         map: &dyn MapEstimate,
     ) -> Vec<Option<ObjectId>> {
         let again = self.assign_known(image, map);
-        let is_free = |before: &ObjectId| !again.contains(&Some(*before));
-        let keep = |(now, before): (&Option<ObjectId>, &Option<ObjectId>)| now.or(before.filter(is_free));
-        again.iter().zip(names).map(keep).collect()
+        let camera = |i: usize| image.detections[i].camera.index;
+        let is_free = |i: usize, before: ObjectId| {
+            (0..again.len()).all(|j| again[j] != Some(before) || camera(j) != camera(i))
+        };
+        let keep = |i: usize| again[i].or(names[i].filter(|before| is_free(i, *before)));
+        (0..again.len()).map(keep).collect()
     }
 
     fn learn_from_frame(
@@ -83,19 +84,20 @@ impl Associator for Tracker {
             self.next = self.next.max(id.0.saturating_add(1));
             let detection = Detection { frame: image.frame, object: Some(id), ..detection.clone() };
             let one = TrackBox { timestamp: image.timestamp, index: place, detection };
-            let Some(t) = self.find_or_create_track(id, &one.from(pose), usual) else { continue };
+            let Some(t) = self.find_or_create_track(id, &one.from(&pose), usual) else { continue };
             self.tracks[t].add_class_vote(&one.detection.scores, &self.aliases, 1.0);
             seen.push((t, one));
         }
         // keep the twin that fits best
         seen.sort_by(|(a, x), (b, y)| {
-            let fits = |t: usize, seen: &TrackBox| self.tracks[t].overlap(&seen.from(pose), &self.camera);
-            a.cmp(b).then_with(|| fits(*b, y).total_cmp(&fits(*a, x)))
+            let fits = |t: usize, seen: &TrackBox| self.tracks[t].overlap(&seen.from(&pose));
+            let image = |t: usize, seen: &TrackBox| (t, seen.image());
+            image(*a, x).cmp(&image(*b, y)).then_with(|| fits(*b, y).total_cmp(&fits(*a, x)))
         });
-        seen.dedup_by_key(|(t, _)| *t);
+        seen.dedup_by_key(|(t, seen)| (*t, seen.image()));
         let noise = self.settings.noise();
         for (t, one) in seen {
-            self.tracks[t].add_box(one, pose, map, &self.camera, &noise);
+            self.tracks[t].add_box(one, pose, map, &noise);
         }
         let forgotten = self.forget_tentative_tracks(image.timestamp);
         self.pending_frames.push_back(PendingFrame::new(image, names));
@@ -113,14 +115,13 @@ impl Tracker {
     /// Creates a tracker with the objects of the prior map.
     pub(super) fn new(
         settings: LikelihoodAssociation,
-        camera: Camera,
         aliases: ClassAliases,
         known: &[Arc<PriorObject>],
     ) -> Self {
         let mut tracks: Vec<Track> = known.iter().map(|object| Track::of_prior_object(object)).collect();
         tracks.sort_by_key(|track| track.id);
         let next = tracks.iter().map(|track| track.id.0.saturating_add(1)).max().unwrap_or(1);
-        Self { settings, camera, aliases, tracks, next, start_time: None, pending_frames: VecDeque::new() }
+        Self { settings, aliases, tracks, next, start_time: None, pending_frames: VecDeque::new() }
     }
 
     /// Returns the number of objects of the prior map.
@@ -141,10 +142,15 @@ impl Tracker {
         let mut names = vec![None; image.detections.len()];
         let Some(pose) = map.pose(image.frame) else { return names };
         let scored = best_scores(image.detections);
-        let (gains, tracks) = self.gains(image, &scored, &pose);
-        let matched = best_assignment(scored.len(), tracks.len(), &gains);
-        for (i, column) in scored.iter().zip(matched) {
-            names[*i] = column.map(|column| self.tracks[tracks[column]].id);
+        let camera = |i: &usize| image.detections[*i].camera.index;
+        let mut by_camera = scored.clone();
+        by_camera.sort_by_key(camera);
+        for own in by_camera.chunk_by(|a, b| camera(a) == camera(b)) {
+            let (gains, tracks) = self.gains(image, own, &pose);
+            let matched = best_assignment(own.len(), tracks.len(), &gains);
+            for (i, column) in own.iter().zip(matched) {
+                names[*i] = column.map(|column| self.tracks[tracks[column]].id);
+            }
         }
         for i in scored {
             if names[i].is_none() {
@@ -155,13 +161,17 @@ impl Tracker {
     }
 
     /// Returns the gain of each known object over a new one, as (row, column, gain), and the objects of the
-    /// columns.
+    /// columns. The boxes are those of one camera.
     pub(super) fn gains(
         &self,
         image: &FrameDetections<'_>,
         boxes: &[usize],
         pose: &Se3,
     ) -> (Vec<(usize, usize, f64)>, Vec<usize>) {
+        let Some(camera) = boxes.first().map(|i| &image.detections[*i].camera) else {
+            return Default::default();
+        };
+        let pose = &camera.pose(pose);
         let usual = self.usual_depth(pose);
         let classes: Vec<Option<String>> =
             boxes.iter().map(|i| self.best_class(&image.detections[*i])).collect();
@@ -170,7 +180,7 @@ impl Tracker {
         for (t, track) in self.tracks.iter().enumerate() {
             let since = track.last_seen_s.unwrap_or(began);
             let unseen = (image.timestamp - since).max(0.0);
-            let Some(expected) = track.expected_box(unseen, pose, &self.camera, &self.settings) else {
+            let Some(expected) = track.expected_box(unseen, pose, &camera.model, &self.settings) else {
                 continue;
             };
             let before = gains.len();
@@ -179,7 +189,7 @@ impl Tracker {
                 if !detection.bounding_box.intersects(expected.bounding_box()) {
                     continue;
                 }
-                let new = self.settings.cost_of_new(&self.camera, &detection.quantities, usual);
+                let new = self.settings.cost_of_new(&camera.model, &detection.quantities, usual);
                 let cost = expected.cost(&detection.bounding_box, &detection.quantities)
                     - 2.0 * self.class_likelihood(track, classes[row].as_deref()).ln();
                 if cost < new {
@@ -203,18 +213,17 @@ impl Tracker {
         self.settings.class_likelihood(class.map_or(1.0, |class| track.class_share(class)))
     }
 
-    /// Returns the object of the most similar box with an object, if the overlap is large enough.
+    /// Returns the object of the most similar box of the same camera with an object, if the overlap is large enough.
     fn twin_object(
         &self,
         detections: &[Detection],
         names: &[Option<ObjectId>],
         i: usize,
     ) -> Option<ObjectId> {
-        let own = &detections[i].bounding_box;
-        let named = detections
-            .iter()
-            .zip(names)
-            .filter_map(|(other, name)| Some((own.iou(&other.bounding_box), (*name)?)));
+        let own = &detections[i];
+        let others = detections.iter().zip(names).filter(|(other, _)| other.camera.index == own.camera.index);
+        let named =
+            others.filter_map(|(other, name)| Some((own.bounding_box.iou(&other.bounding_box), (*name)?)));
         let near = named.filter(|(iou, _)| *iou >= *self.settings.twin_iou);
         near.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
     }
@@ -224,8 +233,8 @@ impl Tracker {
         self.track_index(id).or_else(|| {
             // the detection carries the uncertainty of a measured depth
             let depth = first.quantities.depth().unwrap_or(depth);
-            let belief = ObjectPrior::new(first, &self.camera, depth, *self.settings.depth_spread);
-            self.tracks.push(Track::new(id, belief, first, &self.camera, &self.settings.noise())?);
+            let belief = ObjectPrior::new(first, depth, *self.settings.depth_spread);
+            self.tracks.push(Track::new(id, belief, first, &self.settings.noise())?);
             Some(self.tracks.len() - 1)
         })
     }

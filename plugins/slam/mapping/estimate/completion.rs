@@ -13,7 +13,7 @@ use indexmap::IndexMap;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{FactorEntry, Key, Values};
-use manifactor_quadric::{BoundingBoxFactor, BoxModel, Camera, DualQuadric};
+use manifactor_quadric::{BoundingBoxFactor, BoxModel, DualQuadric};
 use manifactor_solve::{
     CompileError, LevenbergMarquardt, Observer, Outcome, Silent, Stall, Stopping, Termination, solve,
 };
@@ -117,7 +117,7 @@ impl Estimate {
             Some(StampedPose { timestamp: sequence.frames.get(i)?.timestamp, pose })
         };
         let start = |measured: &ObjectMeasurements| {
-            let found = initial_quadric(measured, at, sequence.camera, settings);
+            let found = initial_quadric(measured, at, settings);
             let before = || self.solution.values.get::<DualQuadric>(object_key(measured.id)).ok().copied();
             found.or_else(|rejection| match rejection {
                 Rejection::Initialisation { .. } => before().ok_or(rejection),
@@ -133,7 +133,7 @@ impl Estimate {
                 if let Some(rejection) = &object.rejected {
                     return Err(rejection.clone());
                 }
-                let checked = fitted.check(object, measured, sequence.camera, settings);
+                let checked = fitted.check(object, measured, settings);
                 is_settled &= matches!(checked, Ok((_, 0)));
                 let (quadric, removed) = checked?;
                 untouched += removed;
@@ -215,7 +215,6 @@ impl FittedObjects {
         &self,
         object: &MappedObject,
         measured: &mut ObjectMeasurements,
-        camera: Camera,
         settings: &RunSettings,
     ) -> Result<(DualQuadric, usize), Rejection> {
         let missing = Rejection::Views { views: 0, least: settings.objects.min_views };
@@ -223,7 +222,7 @@ impl FittedObjects {
         if measured.prior.is_some() {
             return Ok((quadric, 0));
         }
-        let overlap_of = |view: &ObjectBox| overlap(view, &quadric, &self.values, camera);
+        let overlap_of = |view: &ObjectBox| overlap(view, &quadric, &self.values);
         // at a jump, the cost is least beside it
         let is_jump = |end: &&Termination| matches!(end, Termination::Stalled { reason: Stall::Jump });
         if let Some(termination) = self.stalled.get(&object.key).filter(|end| !is_jump(end)) {
@@ -294,9 +293,10 @@ fn is_unexplained(object: &MappedObject) -> bool {
 }
 
 /// Returns the intersection over union of a box with the visible part of an ellipsoid's outline.
-fn overlap(view: &ObjectBox, quadric: &DualQuadric, values: &Values, camera: Camera) -> f64 {
+fn overlap(view: &ObjectBox, quadric: &DualQuadric, values: &Values) -> f64 {
     let Ok(pose) = values.get::<Se3>(pose_key(view.frame)) else { return 0.0 };
-    let factor = BoundingBoxFactor { bounding_box: view.bounding_box, camera, model: BoxModel::Truncated };
-    let outline = factor.predict(pose, quadric).filter(|_| quadric.is_in_front_of(pose));
+    let (bounding_box, camera, pose) = (view.bounding_box, view.camera.model, view.camera_pose(pose));
+    let factor = BoundingBoxFactor { bounding_box, camera, model: BoxModel::Truncated };
+    let outline = factor.predict(&pose, quadric).filter(|_| quadric.is_in_front_of(&pose));
     outline.map_or(0.0, |outline| outline.iou(&view.bounding_box))
 }

@@ -3,6 +3,7 @@ use crate::estimate::{Estimate, LandmarkEstimate};
 use crate::mapping::measurements::{ObjectBox, ObjectMeasurements};
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
+use manifactor_recording::camera::Cameras;
 use manifactor_recording::prior_map::DetectionCounts;
 use manifactor_recording::sequence::ObjectId;
 use nalgebra::Vector3;
@@ -75,23 +76,22 @@ pub fn count_opportunities(estimate: &Estimate, border: f64) -> BTreeMap<ObjectI
     let objects: Vec<ExpectedObject> = estimate.landmarks().iter().map(expected).collect();
     let trajectory = estimate.trajectory();
     let poses = trajectory.iter().enumerate().map(|(frame, at)| (frame, at.timestamp, at.pose));
-    // only frames with the whole object count as opportunities, so only whole boxes count as detections
-    let Camera { width, height, .. } = estimate.sequence.camera;
-    let is_whole = |view: &&ObjectBox| view.bounding_box.sides_inside(width, height, border) == [true; 4];
-    let frames_of = |measured: &ObjectMeasurements| {
-        let frames = measured.views.iter().filter(is_whole).map(|view| view.frame).collect();
-        (measured.id, frames)
+    // only images of the whole object count as opportunities, so only whole boxes count as detections
+    let is_whole = |view: &&ObjectBox| is_whole(&view.bounding_box, &view.camera.model, border);
+    let images_of = |measured: &ObjectMeasurements| {
+        let images = measured.views.iter().filter(is_whole).map(ObjectBox::image).collect();
+        (measured.id, images)
     };
-    let seen: BTreeMap<ObjectId, Vec<usize>> =
-        estimate.mapping.measurements.objects.iter().map(frames_of).collect();
+    let seen: BTreeMap<ObjectId, Vec<(usize, usize)>> =
+        estimate.mapping.measurements.objects.iter().map(images_of).collect();
     let mut all: BTreeMap<ObjectId, OpportunityCounter> = BTreeMap::new();
-    visit_visible_objects(&objects, poses, &estimate.sequence.camera, border, |sight| {
+    visit_visible_objects(&objects, poses, &estimate.sequence.cameras, border, |sight| {
         let counted = all.entry(sight.id).or_default();
-        let frames = seen.get(&sight.id).map_or(&[][..], Vec::as_slice);
+        let images = seen.get(&sight.id).map_or(&[][..], Vec::as_slice);
         if sight.begins {
-            counted.start_opportunity(frames.last().copied(), &sight);
+            counted.start_opportunity(images.last().map(|(frame, _)| *frame), &sight);
         }
-        if frames.binary_search(&sight.frame).is_ok() {
+        if images.binary_search(&(sight.frame, sight.camera)).is_ok() {
             counted.record_detection(sight.from);
         }
     });
@@ -105,6 +105,8 @@ pub struct VisibleObject {
     pub id: ObjectId,
     /// Number of the frame.
     pub frame: usize,
+    /// Index of the camera.
+    pub camera: usize,
     /// Pose of the camera.
     pub pose: Se3,
     /// Vector from the centre of the object to the camera.
@@ -113,28 +115,30 @@ pub struct VisibleObject {
     pub begins: bool,
 }
 
-/// Calls `visit` for each visible object of each frame (index, timestamp in seconds, pose). An object counts
+/// Calls `visit` for each visible object of each image of the frames (index, timestamp in seconds, pose). An object counts
 /// as visible if its whole outline is at least `border` pixels inside the image, it is not much smaller than
 /// its smallest box, and no mapped object occludes it.
 pub fn visit_visible_objects(
     objects: &[ExpectedObject],
     frames: impl Iterator<Item = (usize, f64, Se3)>,
-    camera: &Camera,
+    cameras: &Cameras,
     border: f64,
     mut visit: impl FnMut(VisibleObject),
 ) {
     // start time and first direction of the current opportunity
-    let mut current: BTreeMap<ObjectId, (f64, Vector3<f64>)> = BTreeMap::new();
-    for (frame, seconds, pose) in frames {
-        for (id, from) in in_view(objects, &pose, camera, border) {
+    let mut current: BTreeMap<(ObjectId, usize), (f64, Vector3<f64>)> = BTreeMap::new();
+    let images = frames.flat_map(|frame| cameras.iter().map(move |camera| (frame, camera)));
+    for ((frame, seconds, pose), camera) in images {
+        let pose = camera.pose(&pose);
+        for (id, from) in in_view(objects, &pose, &camera.model, border) {
             let goes_on = |(began, first): &(f64, Vector3<f64>)| {
                 seconds - began < NEW_OPPORTUNITY_S && first.angle(&from) < NEW_OPPORTUNITY_RAD
             };
-            let begins = !current.get(&id).is_some_and(goes_on);
+            let begins = !current.get(&(id, camera.index)).is_some_and(goes_on);
             if begins {
-                current.insert(id, (seconds, from));
+                current.insert((id, camera.index), (seconds, from));
             }
-            visit(VisibleObject { id, frame, pose, from, begins });
+            visit(VisibleObject { id, frame, camera: camera.index, pose, from, begins });
         }
     }
 }
@@ -176,10 +180,13 @@ fn in_view(
             nearer.filter_map(|(_, other, ..)| Some(own.intersection(other)?.area() / own.area()));
         shares.any(|share| share > MAX_OCCLUDED_SHARE)
     };
-    let is_whole =
-        |outline: &BoundingBox| outline.sides_inside(camera.width, camera.height, border) == [true; 4];
     let there = outlines.iter().filter(|(_, outline, from, area)| {
-        outline.area() >= *area && is_whole(outline) && !is_hidden(outline, from)
+        outline.area() >= *area && is_whole(outline, camera, border) && !is_hidden(outline, from)
     });
     there.map(|(id, _, from, _)| (*id, *from)).collect()
+}
+
+/// Returns whether all sides of a box are at least `border` pixels inside the image.
+fn is_whole(bounding_box: &BoundingBox, camera: &Camera, border: f64) -> bool {
+    bounding_box.sides_inside(camera.width, camera.height, border) == [true; 4]
 }

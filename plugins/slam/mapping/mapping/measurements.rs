@@ -2,9 +2,11 @@
 //!
 //! The filters, in this order: boxes without area, detections without an object and detections with a low
 //! score are skipped. The class is fused from all remaining ones. Boxes cut by the border are dropped or lose
-//! a side. If an object has several boxes in one frame, the last one counts.
+//! a side. If an object has several boxes in one image, the last one counts.
 use crate::settings::{DetectionSettings, MapAnchor, RunSettings};
+use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
+use manifactor_recording::camera::MountedCamera;
 use manifactor_recording::class::ClassAliases;
 use manifactor_recording::fusion::{ClassFusion, FusedClass};
 use manifactor_recording::measurement::Quantities;
@@ -17,12 +19,26 @@ use std::sync::Arc;
 pub struct ObjectBox {
     /// Index of the frame in the sequence.
     pub frame: usize,
+    /// The camera of the image.
+    pub camera: Arc<MountedCamera>,
     /// The box, in pixels.
     pub bounding_box: BoundingBox,
     /// Sides inside the border, in the order xmin, ymin, xmax, ymax. Only these belong to the object.
     pub inside: [bool; 4],
     /// Further measurements of the detection.
     pub quantities: Quantities,
+}
+
+impl ObjectBox {
+    /// Returns the frame and the index of the camera.
+    pub fn image(&self) -> (usize, usize) {
+        (self.frame, self.camera.index)
+    }
+
+    /// Returns the pose of its camera from the pose of its frame.
+    pub fn camera_pose(&self, world_from_first: &Se3) -> Se3 {
+        self.camera.pose(world_from_first)
+    }
 }
 
 /// The measurements of an object.
@@ -35,7 +51,7 @@ pub struct ObjectMeasurements {
     fusion: ClassFusion,
     /// Number of detections associated with it.
     pub detections: usize,
-    /// Its remaining boxes in the order of frames, at most one per frame.
+    /// Its remaining boxes in the order of frames, then of cameras; at most one per image.
     pub views: Vec<ObjectBox>,
 }
 
@@ -52,7 +68,7 @@ pub struct Measurements {
     pub low_score: usize,
     /// Boxes that were dropped because the border cuts them.
     pub cut: usize,
-    /// Boxes that a later box of their object in their frame replaced.
+    /// Boxes that a later box of their object in their image replaced.
     pub duplicates: usize,
     /// Boxes that were removed because the ellipsoid of their object does not touch them.
     pub untouched: usize,
@@ -63,7 +79,7 @@ impl Measurements {
     pub fn gather(sequence: &Sequence, settings: &RunSettings) -> Self {
         let mut all = Self::new(settings.anchor());
         for detection in &sequence.detections {
-            all.add_detection(detection, &sequence.camera, &settings.detections, &settings.aliases);
+            all.add_detection(detection, &settings.detections, &settings.aliases);
         }
         all
     }
@@ -78,11 +94,10 @@ impl Measurements {
     pub fn add_detection(
         &mut self,
         detection: &Detection,
-        camera: &Camera,
         settings: &DetectionSettings,
         aliases: &ClassAliases,
     ) {
-        let sifted = filter_detection(detection, camera, settings);
+        let sifted = filter_detection(detection, settings);
         if let FilteredDetection::WithoutArea = sifted {
             self.without_area += 1;
             return;
@@ -110,11 +125,10 @@ impl Measurements {
         &mut self,
         detection: &Detection,
         from: ObjectId,
-        camera: &Camera,
         settings: &DetectionSettings,
         aliases: &ClassAliases,
     ) {
-        let sifted = filter_detection(detection, camera, settings);
+        let sifted = filter_detection(detection, settings);
         match sifted {
             FilteredDetection::WithoutArea => return,
             FilteredDetection::LowScore => {
@@ -130,7 +144,7 @@ impl Measurements {
         match sifted {
             FilteredDetection::View(view) => match object.views.iter().position(|own| *own == view) {
                 Some(own) => drop(object.views.remove(own)),
-                // a later box of its frame has replaced it
+                // a later box of its image has replaced it
                 None => self.duplicates = self.duplicates.saturating_sub(1),
             },
             _ => self.cut = self.cut.saturating_sub(1),
@@ -153,7 +167,8 @@ impl Measurements {
         let Some(object) = self.objects.get_mut(place) else { return vec![] };
         object.detections += gone.detections;
         object.fusion.add_all(gone.fusion);
-        let seen = |view: &ObjectBox| object.views.binary_search_by_key(&view.frame, |own| own.frame).is_ok();
+        let seen =
+            |view: &ObjectBox| object.views.binary_search_by_key(&view.image(), ObjectBox::image).is_ok();
         let (twice, new): (Vec<_>, Vec<_>) = gone.views.into_iter().partition(seen);
         self.duplicates += twice.len();
         for view in &new {
@@ -196,11 +211,7 @@ pub enum FilteredDetection {
 }
 
 /// Applies the filters to a detection.
-pub fn filter_detection(
-    detection: &Detection,
-    camera: &Camera,
-    settings: &DetectionSettings,
-) -> FilteredDetection {
+pub fn filter_detection(detection: &Detection, settings: &DetectionSettings) -> FilteredDetection {
     if !detection.bounding_box.has_area() {
         return FilteredDetection::WithoutArea;
     }
@@ -208,12 +219,13 @@ pub fn filter_detection(
         return FilteredDetection::LowScore;
     }
     let bounding_box = detection.bounding_box;
-    let inside = bounding_box.sides_inside(camera.width, camera.height, *settings.border_px);
+    let Camera { width, height, .. } = detection.camera.model;
+    let inside = bounding_box.sides_inside(width, height, *settings.border_px);
     if !settings.cut_sides.accepts(inside) {
         return FilteredDetection::Cut;
     }
-    let quantities = detection.quantities.clone();
-    FilteredDetection::View(ObjectBox { frame: detection.frame, bounding_box, inside, quantities })
+    let (camera, quantities) = (detection.camera.clone(), detection.quantities.clone());
+    FilteredDetection::View(ObjectBox { frame: detection.frame, camera, bounding_box, inside, quantities })
 }
 
 impl ObjectMeasurements {
@@ -226,15 +238,16 @@ impl ObjectMeasurements {
         Self { fusion: object.classes.clone(), prior: Some(object.clone()), ..Self::new(object.id) }
     }
 
-    /// Returns its box in a frame, if there is one.
-    pub fn view(&self, frame: usize) -> Option<&ObjectBox> {
-        let place = self.views.binary_search_by_key(&frame, |view| view.frame).ok()?;
-        self.views.get(place)
+    /// Returns its boxes in a frame, one for each camera that sees it.
+    pub fn views_in(&self, frame: usize) -> &[ObjectBox] {
+        let from = self.views.partition_point(|view| view.frame < frame);
+        let until = self.views.partition_point(|view| view.frame <= frame);
+        &self.views[from..until]
     }
 
-    /// Adds a box. Returns whether it replaces an earlier box of its frame.
+    /// Adds a box. Returns whether it replaces an earlier box of its image.
     fn add_box(&mut self, view: ObjectBox) -> bool {
-        let place = self.views.binary_search_by_key(&view.frame, |view| view.frame);
+        let place = self.views.binary_search_by_key(&view.image(), ObjectBox::image);
         match place {
             Ok(place) => self.views[place] = view,
             Err(place) => self.views.insert(place, view),
@@ -290,6 +303,7 @@ mod tests {
             frame,
             object: Some(ObjectId(object)).filter(|_| object > 0),
             scores: ClassScores::single(class, score),
+            camera: sequence().cameras.first().clone(),
             bounding_box: BoundingBox::new(bounds).unwrap(),
             quantities: Quantities::NONE,
         }
@@ -299,10 +313,9 @@ mod tests {
     const CUT: [f64; 4] = [10.0, 100.0, 200.0, 150.0];
 
     fn gather(detections: &[Detection], settings: &DetectionSettings) -> Measurements {
-        let camera = sequence().camera;
         let mut all = Measurements::default();
         for detection in detections {
-            all.add_detection(detection, &camera, settings, &ClassAliases::default());
+            all.add_detection(detection, settings, &ClassAliases::default());
         }
         all
     }

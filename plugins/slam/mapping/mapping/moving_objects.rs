@@ -2,7 +2,6 @@
 use super::Rejection;
 use super::measurements::ObjectBox;
 use manifactor_formats::tum::StampedPose;
-use manifactor_quadric::Camera;
 use nalgebra::{Matrix3x4, Matrix4, Vector3, Vector4};
 
 /// Length of the windows in seconds. Odometry counts as exact within a window.
@@ -38,16 +37,16 @@ struct PosedCentre {
 pub(super) fn check_still(
     views: &[ObjectBox],
     at: impl Fn(usize) -> Option<StampedPose>,
-    camera: &Camera,
     depth_error: f64,
 ) -> Result<(), Rejection> {
-    let error = depth_error.hypot(CENTRE_SIGMA_PX / camera.fx);
+    let error_of = |view: &ObjectBox| depth_error.hypot(CENTRE_SIGMA_PX / view.camera.model.fx);
     let place = |view: &ObjectBox| {
         // the border shifts the centre of a box that it cuts
         let depth = view.quantities.depth().filter(|_| view.inside == [true; 4])?;
         let StampedPose { timestamp: time, pose } = at(view.frame)?;
-        let place = pose.act(&(camera.ray(view.bounding_box.centre()) * depth));
-        Some(PosedCentre { time, camera: pose.translation, place, sigma: depth * error })
+        let pose = view.camera_pose(&pose);
+        let place = pose.act(&(view.camera.model.ray(view.bounding_box.centre()) * depth));
+        Some(PosedCentre { time, camera: pose.translation, place, sigma: depth * error_of(view) })
     };
     let places: Vec<PosedCentre> = views.iter().filter_map(place).collect();
     let MotionStatistics { speed, evidence, scatter } = MotionStatistics::from_centres(&places, depth_error);
@@ -55,6 +54,7 @@ pub(super) fn check_still(
         return Err(Rejection::Moves { speed, evidence, limit: MAX_EVIDENCE });
     }
     if scatter > MAX_SCATTER {
+        let error = views.iter().map(error_of).fold(0.0, f64::max);
         return Err(Rejection::Scatters { scatter: scatter * error, limit: MAX_SCATTER * error });
     }
     Ok(())

@@ -3,8 +3,8 @@ use super::moving_objects;
 use crate::mapping::measurements::{ObjectBox, ObjectMeasurements};
 use crate::settings::{ObjectSettings, RunSettings};
 use manifactor_formats::tum::StampedPose;
+use manifactor_quadric::DualQuadric;
 use manifactor_quadric::initialise::{ObjectView, parallax};
-use manifactor_quadric::{Camera, DualQuadric};
 use serde::Serialize;
 use std::fmt;
 
@@ -131,7 +131,6 @@ impl fmt::Display for Rejection {
 pub fn initial_quadric(
     measured: &ObjectMeasurements,
     at: impl Fn(usize) -> Option<StampedPose>,
-    camera: Camera,
     RunSettings { objects: settings, detections, .. }: &RunSettings,
 ) -> Result<DualQuadric, Rejection> {
     if let Some(prior) = &measured.prior {
@@ -143,7 +142,7 @@ pub fn initial_quadric(
         Some(ObjectView {
             observed: view.inside,
             depth: view.quantities.depth(),
-            ..ObjectView::new(pose, camera, view.bounding_box)
+            ..ObjectView::new(view.camera_pose(&pose), view.camera.model, view.bounding_box)
         })
     };
     let views: Vec<ObjectView> = measured.views.iter().filter_map(seen).collect();
@@ -154,7 +153,7 @@ pub fn initial_quadric(
     }
     let started = settings.initialiser.initialise(&views);
     let start = started.map_err(|error| Rejection::Initialisation { message: error.to_string() })?;
-    check_still(measured, &measured.views, at, &camera, *detections.depth_error).map(|()| start)
+    check_still(measured, &measured.views, at, *detections.depth_error).map(|()| start)
 }
 
 /// Checks that an object stands still, according to the depths of these boxes. Objects of the prior map
@@ -163,13 +162,12 @@ pub fn check_still(
     measured: &ObjectMeasurements,
     views: &[ObjectBox],
     at: impl Fn(usize) -> Option<StampedPose>,
-    camera: &Camera,
     depth_error: f64,
 ) -> Result<(), Rejection> {
     if measured.prior.is_some() {
         return Ok(());
     }
-    moving_objects::check_still(views, at, camera, depth_error)
+    moving_objects::check_still(views, at, depth_error)
 }
 
 /// Checks that an object has enough boxes of consistent size. Objects of the prior map always pass.

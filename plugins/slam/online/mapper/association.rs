@@ -117,8 +117,8 @@ impl Mapper {
     /// Moves a detection to a different object in the measurements.
     fn move_detection(&mut self, DetectionMove { from, detection, .. }: &DetectionMove) {
         let RunSettings { detections, aliases, .. } = &*self.settings;
-        self.measurements.remove_detection(detection, *from, &self.camera, detections, aliases);
-        self.measurements.add_detection(detection, &self.camera, detections, aliases);
+        self.measurements.remove_detection(detection, *from, detections, aliases);
+        self.measurements.add_detection(detection, detections, aliases);
         if let Some(object @ ObjectState::Removed) = self.objects.get_mut(from) {
             // without this detection it may be one object
             *object = ObjectState::default();
@@ -150,8 +150,9 @@ impl Mapper {
                     let gone = mapped.boxes.extract_if(.., |(of, _)| frames.contains(of));
                     let gone: Vec<FactorId> = gone.map(|(_, factor)| factor).collect();
                     self.remove_factors(&gone, report);
-                    let view = |frame: &usize| self.measured(id)?.view(*frame).cloned();
-                    let views: Vec<ObjectBox> = frames.iter().filter_map(view).collect();
+                    let views_in =
+                        |frame: &usize| self.measured(id).map_or(&[][..], |own| own.views_in(*frame));
+                    let views: Vec<ObjectBox> = frames.iter().flat_map(views_in).cloned().collect();
                     self.push_boxes(id, &views, report);
                 }
                 ObjectState::Tentative(_) => {
@@ -175,7 +176,7 @@ impl Mapper {
         let mut sights = ViewingDirections::new();
         for view in self.measured(id).map_or(&[][..], |measured| &measured.views) {
             if let Some(pose) = self.pose(view.frame) {
-                sights.add(view, &pose, &self.camera);
+                sights.add(view, &pose);
             }
         }
         sights
@@ -207,7 +208,7 @@ impl Mapper {
             ObjectState::Tentative(sights) => {
                 for view in &new {
                     if let Ok(pose) = self.smoother.get(pose_key(view.frame).as_str()) {
-                        sights.add(view, &pose, &self.camera);
+                        sights.add(view, &pose);
                     }
                 }
             }

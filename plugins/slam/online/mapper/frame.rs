@@ -76,7 +76,7 @@ pub struct FrameReport {
 /// The content of a frame after its pose is added.
 pub(super) struct FrameBoxes {
     /// Boxes that passed the filters, by object.
-    pub boxes: BTreeMap<ObjectId, ObjectBox>,
+    pub boxes: BTreeMap<(ObjectId, usize), ObjectBox>,
     /// Corrections to earlier frames.
     pub corrections: Corrections,
     /// True if the up direction changed.
@@ -197,7 +197,7 @@ impl Mapper {
         if is_taken {
             for detection in &named {
                 let RunSettings { detections, aliases, .. } = &*self.settings;
-                self.measurements.add_detection(detection, &self.camera, detections, aliases);
+                self.measurements.add_detection(detection, detections, aliases);
             }
             let newest = (report.frame, self.pose(report.frame).unwrap_or(report.pose));
             let known = AssociationContext {
@@ -255,7 +255,7 @@ impl Mapper {
     /// pushed. Returns whether the boxes were accepted.
     fn update_smoother(
         &mut self,
-        boxes: &BTreeMap<ObjectId, ObjectBox>,
+        boxes: &BTreeMap<(ObjectId, usize), ObjectBox>,
         corrected: Option<AppliedCorrections>,
         alone: (&Graph, &Values),
         report: &mut FrameReport,
@@ -302,13 +302,13 @@ impl Mapper {
     /// Pushes the boxes of mapped objects of a frame. Returns their objects and factors.
     fn push_boxes_of_frame(
         &mut self,
-        boxes: &BTreeMap<ObjectId, ObjectBox>,
+        boxes: &BTreeMap<(ObjectId, usize), ObjectBox>,
     ) -> Result<Vec<(ObjectId, FactorId)>, ChangeError> {
         let (mut graph, mut owners) = (Graph::new(), vec![]);
-        for (id, view) in
-            boxes.iter().filter(|(id, _)| self.objects.get(id).is_some_and(ObjectState::is_mapped))
+        for ((id, _), view) in
+            boxes.iter().filter(|((id, _), _)| self.objects.get(id).is_some_and(ObjectState::is_mapped))
         {
-            for entry in view_entries(view, &object_key(*id), self.camera, &self.settings.detections) {
+            for entry in view_entries(view, &object_key(*id), &self.settings.detections) {
                 graph.push(entry);
                 owners.push(*id);
             }
@@ -325,15 +325,11 @@ impl Mapper {
         }
     }
 
-    /// Returns the boxes of a frame that pass the filters, by object. If an object has several boxes, the
-    /// last one counts.
-    fn boxes_by_object(&self, named: &[Detection]) -> BTreeMap<ObjectId, ObjectBox> {
-        let view = |detection: &Detection| match filter_detection(
-            detection,
-            &self.camera,
-            &self.settings.detections,
-        ) {
-            FilteredDetection::View(view) => Some((detection.object?, view)),
+    /// Returns the boxes of a frame that pass the filters, by object and camera. If an object has several boxes in an
+    /// image, the last one counts.
+    fn boxes_by_object(&self, named: &[Detection]) -> BTreeMap<(ObjectId, usize), ObjectBox> {
+        let view = |detection: &Detection| match filter_detection(detection, &self.settings.detections) {
+            FilteredDetection::View(view) => Some(((detection.object?, view.camera.index), view)),
             _ => None,
         };
         named.iter().filter_map(view).collect()

@@ -58,7 +58,7 @@ impl UpEstimate {
         let first = self.seen.frames.first().map_or(0.0, |frame| frame.timestamp);
         self.is_final = observation.frame.timestamp - first >= gravity.final_after_s();
         if self.is_final {
-            self.seen = SequenceHeader::new(self.seen.camera).into_sequence();
+            self.seen = SequenceHeader::new(self.seen.cameras.clone()).into_sequence();
         }
         let Some(before) = self.found else {
             self.found = Some(found);

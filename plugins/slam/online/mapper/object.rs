@@ -1,7 +1,7 @@
 //! State of an object, from its first box to the map and beyond.
 use manifactor_geometry::Se3;
 use manifactor_mapping::mapping::measurements::{ObjectBox, ObjectMeasurements};
-use manifactor_quadric::{Camera, DualQuadric};
+use manifactor_quadric::DualQuadric;
 use manifactor_smoother::FactorId;
 use nalgebra::Vector3;
 
@@ -73,10 +73,10 @@ impl ViewingDirections {
         Self { lines: vec![], cosine: 1.0, boxes_at_last_attempt: 0 }
     }
 
-    /// Adds the line of sight of a box.
-    pub(super) fn add(&mut self, view: &ObjectBox, pose: &Se3, camera: &Camera) {
-        let ray = camera.ray(view.bounding_box.centre()).normalize();
-        let line = pose.rotation.act(&ray);
+    /// Adds the line of sight of a box, from the pose of its frame.
+    pub(super) fn add(&mut self, view: &ObjectBox, pose: &Se3) {
+        let ray = view.camera.model.ray(view.bounding_box.centre()).normalize();
+        let line = view.camera_pose(pose).rotation.act(&ray);
         self.cosine = self.lines.iter().map(|other| other.dot(&line)).fold(self.cosine, f64::min);
         self.lines.push(line);
     }

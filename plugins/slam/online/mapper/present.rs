@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 impl Mapper {
     /// Returns the camera of all frames.
     pub fn camera(&self) -> &Camera {
-        &self.camera
+        &self.cameras.first().model
     }
 
     /// Returns the up direction in the map; `None` if unknown.

@@ -39,15 +39,19 @@ impl Mapper {
     /// objects.
     pub(super) fn update_objects(&mut self, seen: FrameBoxes, report: &mut FrameReport) {
         let Some(pose) = self.pose(report.frame) else { return };
-        for (id, view) in &seen.boxes {
+        for ((id, _), view) in &seen.boxes {
             if let ObjectState::Tentative(sights) = self.objects.entry(*id).or_default() {
-                sights.add(view, &pose, &self.camera);
+                sights.add(view, &pose);
             }
         }
         let moved = report.moved.iter().flat_map(|moved| [moved.from, moved.into]);
         let changed = moved.chain(report.merged.iter().map(|merge| merge.into));
-        let mut ids: BTreeSet<ObjectId> =
-            seen.boxes.keys().copied().chain(changed.map(|id| self.id_changes.current_id(id))).collect();
+        let mut ids: BTreeSet<ObjectId> = seen
+            .boxes
+            .keys()
+            .map(|(id, _)| *id)
+            .chain(changed.map(|id| self.id_changes.current_id(id)))
+            .collect();
         // objects removed in this frame can only come back with their next detection
         ids.retain(|id| !report.removed.contains(&object_key(*id)));
         let due: Vec<(ObjectId, DueChange)> =
@@ -129,13 +133,7 @@ impl Mapper {
             ObjectState::Mapped(mapped) => match rejection::check_boxes(measured, settings).and_then(|()| {
                 let last = &measured.views[measured.views.len().saturating_sub(MOTION_CHECK_BOXES)..];
                 let depth_error = self.settings.detections.depth_error;
-                rejection::check_still(
-                    measured,
-                    last,
-                    |frame| self.stamped_pose(frame),
-                    &self.camera,
-                    *depth_error,
-                )
+                rejection::check_still(measured, last, |frame| self.stamped_pose(frame), *depth_error)
             }) {
                 Err(rejection) => Some(DueChange::Removal(rejection)),
                 Ok(()) if measured.class_name() != mapped.class.as_deref() => {
@@ -200,8 +198,7 @@ impl Mapper {
     /// Initializes an object and adds it to the map.
     fn initialize_object(&mut self, id: ObjectId, report: &mut FrameReport) {
         let Some(measured) = self.measured(id) else { return };
-        let started =
-            rejection::initial_quadric(measured, |i| self.stamped_pose(i), self.camera, &self.settings);
+        let started = rejection::initial_quadric(measured, |i| self.stamped_pose(i), &self.settings);
         let (views, class) = (measured.views.clone(), measured.class_name().map(str::to_owned));
         let pushed = started.map_err(|rejection| rejection.to_string());
         let pushed = pushed.and_then(|start| self.push_object(id, start, &views));
@@ -274,7 +271,7 @@ impl Mapper {
     pub(super) fn entries_of(&self, key: &Key, views: &[ObjectBox]) -> (Vec<usize>, Vec<FactorEntry>) {
         let there = views.iter().filter(|view| self.pose(view.frame).is_some());
         let entries = there.flat_map(|view| {
-            let entries = view_entries(view, key, self.camera, &self.settings.detections);
+            let entries = view_entries(view, key, &self.settings.detections);
             entries.map(|entry| (view.frame, entry))
         });
         entries.unzip()

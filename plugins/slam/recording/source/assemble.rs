@@ -1,6 +1,7 @@
 //! Frames and detections, matched by time.
 use super::interpolation::pose_at;
 use super::{DetectionsFile, SourceError};
+use crate::camera::MountedCamera;
 use crate::measurement::{DepthMeasurement, Quantities};
 use crate::recording::OBJECTS_FILE;
 use crate::sequence::{
@@ -11,8 +12,9 @@ use manifactor_formats::detections::DetectionRow;
 use manifactor_formats::tum;
 use manifactor_formats::tum::{StampedPose, Trajectory};
 use manifactor_graph::checked::{NotNegative, Positive, Share};
-use manifactor_quadric::{BoundingBox, Camera};
-use std::path::Path;
+use manifactor_quadric::BoundingBox;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Frames, their detections, and the detections without a frame.
 pub(super) type MatchedDetections = (Vec<Frame>, Vec<Detection>, Vec<UnusedInput>);
@@ -51,21 +53,25 @@ pub(super) fn is_default_share(share: &Share) -> bool {
     *share == default_share()
 }
 
-/// Reads odometry and detections, and [matches](match_by_time) them.
+/// Reads odometry, and the detections of each camera, and [matches](match_by_time) them.
 ///
 /// # Errors
 /// Files that cannot be read, or detections that all lack a frame.
 pub(super) fn read_matched(
     folder: &Path,
     odometry: &Path,
-    file: &DetectionsFile,
-    camera: &Camera,
+    files: &[(&DetectionsFile, &Arc<MountedCamera>)],
     by: TimeMatching,
 ) -> Result<MatchedDetections, SourceError> {
     let odometry = folder.join(odometry);
-    let (poses, rows) = (read_poses(&odometry)?, file.read(folder, camera)?);
+    let poses = read_poses(&odometry)?;
+    let mut rows = vec![];
+    for (file, camera) in files {
+        rows.extend(file.read(folder, camera)?);
+    }
+    let first = files.first().map_or_else(PathBuf::new, |(file, _)| file.path(folder));
     let images: Vec<f64> = rows.iter().map(|(timestamp, _)| *timestamp).collect();
-    match_by_time(&poses, images, rows, by, [&file.path(folder), &odometry])
+    match_by_time(&poses, images, rows, by, [&first, &odometry])
 }
 
 /// Assigns each detection to the frame nearest in time. Frames are the poses, or the images with an interpolated
@@ -162,8 +168,8 @@ fn nearest(times: &[f64], timestamp: f64) -> Option<(usize, f64)> {
     away.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Returns the detection of a row, for frame 0.
-pub(super) fn detection(row: &DetectionRow) -> Detection {
+/// Returns the detection of a row in an image of a camera, for frame 0.
+pub(super) fn detection(row: &DetectionRow, camera: &Arc<MountedCamera>) -> Detection {
     let scores: ClassScores = match row.class_scores() {
         Ok(scores) => scores.into_iter().collect(),
         // cannot happen: the reader has checked the scores
@@ -173,6 +179,7 @@ pub(super) fn detection(row: &DetectionRow) -> Detection {
         frame: 0,
         object: row.object_key.filter(|key| *key != 0).map(ObjectId),
         scores,
+        camera: camera.clone(),
         bounding_box: BoundingBox { xmin: row.xmin, ymin: row.ymin, xmax: row.xmax, ymax: row.ymax },
         quantities: row
             .depth

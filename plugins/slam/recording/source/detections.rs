@@ -1,13 +1,14 @@
 //! Files of detections that a source names.
 use super::SourceError;
 use super::assemble::detection;
+use crate::camera::MountedCamera;
 use crate::sequence::Detection;
 use manifactor_config::Value;
 use manifactor_formats::detections::{self, DetectionFormat};
-use manifactor_quadric::Camera;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A file of detections: the path of a CSV file with named columns, or the `format` of another program.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -32,16 +33,20 @@ impl<'de> Deserialize<'de> for DetectionsFile {
 }
 
 impl DetectionsFile {
-    /// Reads the detections with their timestamps.
+    /// Reads the detections in images of a camera, with their timestamps.
     ///
     /// # Errors
     /// Files that cannot be read.
-    pub(super) fn read(&self, folder: &Path, camera: &Camera) -> Result<Vec<(f64, Detection)>, SourceError> {
+    pub(super) fn read(
+        &self,
+        folder: &Path,
+        camera: &Arc<MountedCamera>,
+    ) -> Result<Vec<(f64, Detection)>, SourceError> {
         let rows = match self {
             Self::Csv(file) => detections::read(folder.join(file))?,
-            Self::Format(format) => format.read(folder, [camera.width, camera.height])?,
+            Self::Format(format) => format.read(folder, [camera.model.width, camera.model.height])?,
         };
-        Ok(rows.iter().map(|row| (row.timestamp, detection(row))).collect())
+        Ok(rows.iter().map(|row| (row.timestamp, detection(row, camera))).collect())
     }
 
     /// Returns the files and folders that have to exist.

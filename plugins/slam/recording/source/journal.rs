@@ -7,6 +7,7 @@
 //! If a frame cannot be written, for example on a full disk, it is still mapped. The journal ends there, and
 //! the run reports it.
 use super::stream::FrameStream;
+use crate::camera::Cameras;
 use crate::sequence::Observation;
 use crate::source::{format_line, parse};
 use manifactor_formats::journal::{Journal, JournalError, JournalRecord};
@@ -17,6 +18,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 impl JournalRecord for Observation {
+    type Context = Cameras;
     const NAME: &'static str = "frame";
     const HEADER_STARTS: &'static [&'static str] = &[r#"{"checked_frames_for":""#, r#"{"frames_for":""#];
 
@@ -24,8 +26,8 @@ impl JournalRecord for Observation {
         Ok(format_line(self))
     }
 
-    fn read(line: &[u8]) -> Result<Self, String> {
-        parse(line)
+    fn read(line: &[u8], cameras: &Cameras) -> Result<Self, String> {
+        parse(line, cameras)
     }
 }
 
@@ -36,7 +38,8 @@ impl JournalRecord for Observation {
 /// A file that cannot be read or written, is a link, or is not the journal of these settings. It stays
 /// unchanged.
 pub fn journaled(stream: FrameStream, path: &Path, fingerprint: &str) -> Result<FrameStream, JournalError> {
-    let (mut journal, before) = Journal::<Observation>::open(path, fingerprint)?;
+    let (mut journal, before) =
+        Journal::<Observation>::open(path, fingerprint, stream.opening.cameras.clone())?;
     let past = before.iter().map(|frame| frame.frame.timestamp).fold(f64::NEG_INFINITY, f64::max);
     let had: HashSet<u64> = before.iter().map(|frame| frame.frame.timestamp.to_bits()).collect();
     let is_new = move |frame: &Result<Observation, _>| {
@@ -121,6 +124,7 @@ mod tests {
                 sequence.detections.push(Detection {
                     frame: sequence.frames.len() - 1,
                     bounding_box,
+                    camera: sequence.cameras.first().clone(),
                     scores: ClassScores::single("cup", 0.7),
                     object: Some(ObjectId(object)),
                     quantities: Quantities::default(),

@@ -2,8 +2,10 @@ use super::assemble::read_ground_truth;
 use super::extrinsics::Extrinsics;
 use super::interpolation::{InterpolatedFrames, PoseOrImage};
 use super::rectification::Rectification;
+use super::rig::Rig;
 use super::stream::FrameStream;
 use super::{CameraChoice, InputFolders, SequenceSource, SourceError, check_files};
+use crate::camera::Cameras;
 use crate::sequence::{Observation, Sequence, SequenceHeader};
 use manifactor_formats::FormatError;
 use manifactor_geometry::Se3;
@@ -11,6 +13,7 @@ use manifactor_graph::checked::Positive;
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, stdin};
 use std::path::PathBuf;
@@ -34,6 +37,8 @@ pub use line::{format_line, parse};
 ///   A factor with the `id` of an earlier one replaces it.
 /// - `removed`: ids of factors to remove.
 /// - `corrected`: corrected poses of earlier frames. `pose` refers to the corrected odometry frame.
+///
+/// With `cameras`, further cameras on the same body have names. A box from one of them names it in the field `camera`.
 ///
 /// With `max_pose_gap`, poses and images may have different timestamps, at different rates. A line has `pose`,
 /// `boxes` or both. An image waits for the first pose after it, and may arrive ten seconds late. An image
@@ -61,6 +66,9 @@ pub struct JsonLines {
     /// to the right, y down and z forward. Default: they are poses of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_from_camera: Option<Se3>,
+    /// Further cameras on the same body, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub cameras: BTreeMap<String, FurtherCamera>,
     /// Path of the file, relative to the document. Default: standard input.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
@@ -75,6 +83,16 @@ pub struct JsonLines {
     /// pose. Unit: seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_pose_gap: Option<Positive>,
+}
+
+/// A further camera on the body.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FurtherCamera {
+    /// The camera.
+    pub camera: CameraChoice,
+    /// Pose of the camera in the frame of the body; without `source.body_from_camera`, in the frame of the first camera.
+    pub body_from_camera: Se3,
 }
 
 /// True once standard input has been read: it can be read only once.
@@ -99,7 +117,8 @@ impl SequenceSource for JsonLines {
 
     fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
         let files = [self.file.as_deref(), self.ground_truth.as_deref(), self.camera.file()];
-        check_files(&folders.document, &files)
+        let others = self.cameras.values().map(|further| further.camera.file());
+        check_files(&folders.document, &files.into_iter().chain(others).collect::<Vec<_>>())
     }
 
     fn may_have_up(&self) -> bool {
@@ -121,8 +140,12 @@ impl JsonLines {
             extrinsics.apply_to_ground_truth(truth);
         }
         let lens = Rectification::new(&self.camera, None, &folders.document)?;
+        let others =
+            self.cameras.iter().map(|(name, further)| (name, &further.camera, &further.body_from_camera));
+        let rig = Rig::new(lens, self.body_from_camera).with(others, &folders.document)?;
+        let cameras = rig.cameras.clone();
         let opening = SequenceHeader {
-            camera: lens.camera,
+            cameras: cameras.clone(),
             body_from_camera: self.body_from_camera,
             up: self.up,
             ground_truth,
@@ -140,7 +163,8 @@ impl JsonLines {
             None => (STDIN_NAME.into(), Box::new(BufReader::new(stdin()))),
         };
         let needs_pose = self.max_pose_gap.is_none();
-        let lines = FrameLines { file, reader, line: 0, text: vec![], unreadable: 0, needs_pose }.fuse();
+        let lines =
+            FrameLines { file, reader, cameras, line: 0, text: vec![], unreadable: 0, needs_pose }.fuse();
         let lines = lines.map(move |read| {
             let mut line = read?;
             if let Some(extrinsics) = extrinsics {
@@ -155,7 +179,7 @@ impl JsonLines {
             };
         let rectified = frames.map(move |read| {
             read.map(|mut observation| {
-                lens.apply_to_frame(&mut observation);
+                rig.apply_to_frame(&mut observation);
                 observation
             })
         });
@@ -167,6 +191,7 @@ impl JsonLines {
 struct FrameLines {
     file: PathBuf,
     reader: Box<dyn BufRead + Send>,
+    cameras: Cameras,
     line: usize,
     text: Vec<u8>,
     /// Number of consecutive lines before the next one that are not frames.
@@ -217,7 +242,7 @@ impl FrameLines {
         if self.text.len() as u64 == MAX_LINE_BYTES {
             return Err(format!("the line is longer than {MAX_LINE_BYTES} bytes"));
         }
-        let read = line::parse_line(&self.text)?;
+        let read = line::parse_line(&self.text, &self.cameras)?;
         match (self.needs_pose, read.has_pose, read.is_image) {
             (true, false, _) => Err(
                 "missing field `pose`; if poses and boxes come on separate lines, set `source.max_pose_gap`"

@@ -4,7 +4,9 @@ use super::assemble::{
 use super::camera::{CameraChoice, with_distortion};
 use super::extrinsics::Extrinsics;
 use super::rectification::Rectification;
+use super::rig::Rig;
 use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
+use crate::camera::MountedCamera;
 use crate::sequence::{ClassScores, Detection, Sequence, UnusedInput};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -17,6 +19,7 @@ use recorded_messages::{BoxesOfImage, RecordedMessages};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 mod recorded_messages;
 
@@ -203,12 +206,13 @@ impl SequenceSource for Mcap {
         if let (Some(pose), Some(truth)) = (body_from_camera, &mut ground_truth) {
             Extrinsics::new(pose).apply_to_ground_truth(truth);
         }
+        let rig = Rig::new(lens, body_from_camera);
         let (images, rows, mut unused) = match &self.detections_file {
             Some(rows) => {
-                let rows = rows.read(&folders.document, &lens.camera)?;
+                let rows = rows.read(&folders.document, rig.cameras.first())?;
                 (rows.iter().map(|(timestamp, _)| *timestamp).collect(), rows, vec![])
             }
-            None => self.detections(&messages.boxes),
+            None => self.detections(&messages.boxes, rig.cameras.first()),
         };
         let by = TimeMatching {
             within: NotNegative::literal(1e-6),
@@ -218,10 +222,10 @@ impl SequenceSource for Mcap {
         let from = [&messages.detections_topic, &messages.odometry_topic].map(Path::new);
         let (frames, mut detections, without): MatchedDetections =
             match_by_time(&poses, images, rows, by, from)?;
-        lens.apply(&mut detections)?;
+        rig.apply(&mut detections)?;
         unused.extend(without);
         Ok(Sequence {
-            camera: lens.camera,
+            cameras: rig.cameras,
             body_from_camera,
             frames,
             detections,
@@ -376,11 +380,15 @@ impl Mcap {
     }
 
     /// Returns the times of the images and their boxes, and boxes that cannot be used.
-    fn detections(&self, boxes: &[BoxesOfImage]) -> (Vec<f64>, Vec<(f64, Detection)>, Vec<UnusedInput>) {
+    fn detections(
+        &self,
+        boxes: &[BoxesOfImage],
+        camera: &Arc<MountedCamera>,
+    ) -> (Vec<f64>, Vec<(f64, Detection)>, Vec<UnusedInput>) {
         let (mut rows, mut unused) = (vec![], vec![]);
         for image in boxes {
             for (place, seen) in image.boxes.iter().enumerate() {
-                match seen.clone().and_then(|(bounds, scores)| self.detection(bounds, scores)) {
+                match seen.clone().and_then(|(bounds, scores)| self.detection(bounds, scores, camera)) {
                     Ok(detection) => rows.push((image.timestamp, detection)),
                     Err(fault) => {
                         unused.push(UnusedInput::Box { timestamp: image.timestamp, place: place + 1, fault });
@@ -391,7 +399,12 @@ impl Mcap {
         (boxes.iter().map(|image| image.timestamp).collect(), rows, unused)
     }
 
-    fn detection(&self, bounds: [f64; 4], scores: Vec<(String, f64)>) -> Result<Detection, String> {
+    fn detection(
+        &self,
+        bounds: [f64; 4],
+        scores: Vec<(String, f64)>,
+        camera: &Arc<MountedCamera>,
+    ) -> Result<Detection, String> {
         let bounding_box = BoundingBox::new(bounds).map_err(|error| error.to_string())?;
         if let Some((class, score)) = scores.iter().find(|(_, score)| !(0.0..=1.0).contains(score)) {
             return Err(format!("the score of `{class}` must be a number from 0 to 1, got {score}"));
@@ -402,7 +415,8 @@ impl Mcap {
         };
         let scores: ClassScores = scores.into_iter().map(|(class, score)| (name(class), score)).collect();
         let quantities = crate::measurement::Quantities::NONE;
-        Ok(Detection { frame: 0, object: None, scores, bounding_box, quantities })
+        let camera = camera.clone();
+        Ok(Detection { frame: 0, object: None, scores, camera, bounding_box, quantities })
     }
 }
 

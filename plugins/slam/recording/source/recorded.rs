@@ -4,6 +4,7 @@ use super::assemble::{
 use super::camera::CameraChoice;
 use super::extrinsics::Extrinsics;
 use super::rectification::Rectification;
+use super::rig::Rig;
 use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::Sequence;
 use manifactor_geometry::{Distortion, Se3};
@@ -11,6 +12,7 @@ use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Odometry and detections from the user's own files.
@@ -36,6 +38,9 @@ pub struct RecordedFiles {
     /// to the right, y down and z forward. Default: they are poses of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_from_camera: Option<Se3>,
+    /// Further cameras on the same body, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub cameras: BTreeMap<String, FurtherRecordedCamera>,
     /// Coefficients k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆ of a `radial_tangential` camera in the order of OpenCV, the first
     /// four, five or all, to rectify boxes. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -69,6 +74,18 @@ pub struct RecordedFiles {
     pub max_pose_gap: Option<Positive>,
 }
 
+/// A further camera on the body, with its own detections.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FurtherRecordedCamera {
+    /// The camera.
+    pub camera: CameraChoice,
+    /// Pose of the camera in the frame of the body; without `source.body_from_camera`, in the frame of the first camera.
+    pub body_from_camera: Se3,
+    /// Detections in its images, in the folder: a CSV file, or a table with the `format` of another program.
+    pub detections: DetectionsFile,
+}
+
 fn odometry() -> PathBuf {
     "odometry.txt".into()
 }
@@ -84,14 +101,19 @@ impl SequenceSource for RecordedFiles {
     fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.folder, "source.folder")?;
         let lens = Rectification::new(&self.camera, self.distortion, &folders.document)?;
+        let others =
+            self.cameras.iter().map(|(name, further)| (name, &further.camera, &further.body_from_camera));
+        let rig = Rig::new(lens, self.body_from_camera).with(others, &folders.document)?;
         let by = TimeMatching {
             within: self.max_time_difference,
             without_pose: self.max_without_pose,
             max_pose_gap: self.max_pose_gap,
         };
-        let (mut frames, mut detections, unused) =
-            read_matched(&folder, &self.odometry, &self.detections, &lens.camera, by)?;
-        lens.apply(&mut detections)?;
+        let files =
+            std::iter::once(&self.detections).chain(self.cameras.values().map(|further| &further.detections));
+        let files: Vec<_> = files.zip(rig.cameras.iter()).collect();
+        let (mut frames, mut detections, unused) = read_matched(&folder, &self.odometry, &files, by)?;
+        rig.apply(&mut detections)?;
         let mut truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         if self.objects.is_some() || truth.is_some() {
             let objects = read_objects(&folder, self.objects.as_deref())?;
@@ -102,7 +124,7 @@ impl SequenceSource for RecordedFiles {
             truth.iter_mut().for_each(|truth| extrinsics.apply_to_ground_truth(truth));
         }
         Ok(Sequence {
-            camera: lens.camera,
+            cameras: rig.cameras,
             body_from_camera: self.body_from_camera,
             frames,
             detections,
@@ -117,10 +139,13 @@ impl SequenceSource for RecordedFiles {
 
     fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
         let folder = folders.data_set(&self.folder, "source.folder")?;
-        let named = std::iter::once(self.odometry.as_path()).chain(self.detections.files()).map(Some);
-        let files: Vec<_> = named.chain([self.ground_truth.as_deref(), self.objects.as_deref()]).collect();
+        let others = self.cameras.values().flat_map(|further| further.detections.files());
+        let named = std::iter::once(self.odometry.as_path()).chain(self.detections.files()).chain(others);
+        let files: Vec<_> =
+            named.map(Some).chain([self.ground_truth.as_deref(), self.objects.as_deref()]).collect();
         check_files(&folder, &files)?;
-        check_files(&folders.document, &[self.camera.file()])
+        let others = self.cameras.values().map(|further| further.camera.file());
+        check_files(&folders.document, &std::iter::once(self.camera.file()).chain(others).collect::<Vec<_>>())
     }
 
     fn may_have_up(&self) -> bool {

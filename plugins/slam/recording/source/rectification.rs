@@ -3,7 +3,6 @@
 //! The outline of an ellipsoid is a conic only for a pinhole camera. All code after a source therefore uses
 //! the rectified image, and camera models appear only in this module.
 use super::{CameraChoice, SourceError};
-use crate::sequence::{Detection, Observation, UnusedInput};
 use manifactor_geometry::{AnyCamera, Distortion, RadialTangential};
 use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::Vector2;
@@ -51,41 +50,12 @@ impl Rectification {
         Self { camera, model }
     }
 
-    /// Rectifies the boxes of a recording.
-    ///
-    /// # Errors
-    /// If a box has no place in the rectified image.
-    pub(super) fn apply(&self, detections: &mut [Detection]) -> Result<(), SourceError> {
-        let Some(model) = &self.model else { return Ok(()) };
-        for detection in detections {
-            let seen = detection.bounding_box;
-            detection.bounding_box = rectified(&**model, &seen)
-                .ok_or(SourceError::Distorted { frame: detection.frame, bounds: seen.bounds() })?;
+    /// Rectifies a box. Returns `None`, and leaves the box unchanged, if it has no place in the rectified image.
+    pub(super) fn rectify(&self, bounding_box: &mut BoundingBox) -> Option<()> {
+        if let Some(model) = &self.model {
+            *bounding_box = rectified(&**model, bounding_box)?;
         }
-        Ok(())
-    }
-
-    /// Rectifies the boxes of one frame. Boxes without a place in the rectified image are left out and
-    /// reported.
-    pub(super) fn apply_to_frame(&self, observation: &mut Observation) {
-        let Some(model) = &self.model else { return };
-        let timestamp = observation.frame.timestamp;
-        let mut place = 0;
-        let unused = &mut observation.unused;
-        observation.detections.retain_mut(|detection| {
-            place += 1;
-            let seen = detection.bounding_box;
-            match rectified(&**model, &seen) {
-                Some(bounding_box) => detection.bounding_box = bounding_box,
-                None => {
-                    let fault =
-                        format!("{:?} has no place in the rectified image of the camera", seen.bounds());
-                    unused.push(UnusedInput::Box { timestamp, place, fault });
-                    return false;
-                }
-            }
-            true
-        });
+        Some(())
     }
 }
 

@@ -1,6 +1,7 @@
 use super::assemble::{TimeMatching, default_share, is_default_share, read_ground_truth, read_matched};
 use super::camera::{CameraChoice, by_folder};
 use super::rectification::Rectification;
+use super::rig::Rig;
 use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
 use crate::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
@@ -70,14 +71,15 @@ impl SequenceSource for TumRgbd {
             Some(choice) => Rectification::new(choice, self.distortion, &folders.document)?,
             None => Rectification::of_pinhole(by_folder(&folder)?, self.distortion),
         };
+        let rig = Rig::new(lens, None);
         let by = TimeMatching {
             within: self.max_time_difference,
             without_pose: self.max_without_pose,
             max_pose_gap: self.max_pose_gap,
         };
         let (frames, mut detections, unused) =
-            read_matched(&folder, &self.odometry, &self.detections, &lens.camera, by)?;
-        lens.apply(&mut detections)?;
+            read_matched(&folder, &self.odometry, &[(&self.detections, rig.cameras.first())], by)?;
+        rig.apply(&mut detections)?;
         let truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         let file = folder.join("accelerometer.txt");
         let readings = if file.is_file() { accelerometer::read(&file)? } else { vec![] };
@@ -86,7 +88,7 @@ impl SequenceSource for TumRgbd {
             acceleration: r.acceleration,
         };
         Ok(Sequence {
-            camera: lens.camera,
+            cameras: rig.cameras,
             body_from_camera: None,
             frames,
             detections,

@@ -142,7 +142,7 @@ impl VariantRecord {
             about: variant.about.clone(),
             folder: slug(&variant.name),
             up: up(estimate, &drawn),
-            camera: estimate.sequence.camera,
+            camera: estimate.sequence.cameras.first().model,
             alignment,
             relative_over: settings.evaluation.relative_over.get(),
             frames,

@@ -3,6 +3,7 @@ use super::correlation::autocorrelation_time;
 use super::{BoxGroups, VarianceSettings};
 use crate::mapping::{MappedObject, Mapping};
 use indexmap::IndexMap;
+use manifactor_geometry::OnBody;
 use manifactor_graph::batch::FactorState;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{FactorEntry, Key, Noise};
@@ -73,7 +74,7 @@ impl BoxComponent {
 
 /// Returns the box factor of an entry; `None` for other factors.
 pub(super) fn box_of(entry: &FactorEntry) -> Option<&BoundingBoxFactor> {
-    entry.factor.erased().as_any().downcast_ref()
+    OnBody::unwrapped(&*entry.factor).erased().as_any().downcast_ref()
 }
 
 /// Returns width and height of the measured box; `None` for factors without a box.

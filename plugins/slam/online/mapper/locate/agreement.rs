@@ -56,7 +56,7 @@ impl Mapper {
             let every = measured.views.len().div_ceil(MAX_COMPARED_BOXES).max(1);
             let overlaps = measured.views.iter().step_by(every).filter_map(|view| {
                 let pose = aligned.known_from_local.compose(&self.pose(view.frame)?);
-                let outline = self.outline(&pose, &object.quadric, view);
+                let outline = outline(&view.camera_pose(&pose), &object.quadric, view);
                 Some(outline.map_or(0.0, |outline| outline.iou(&view.bounding_box)))
             });
             mean(overlaps)
@@ -81,7 +81,7 @@ impl Mapper {
         // objects detected in the current opportunity
         let mut is_seen = BTreeSet::new();
         let border = self.settings.detections.border_px;
-        visit_visible_objects(&objects, poses, &self.camera, *border, |sight| {
+        visit_visible_objects(&objects, poses, &self.cameras, *border, |sight| {
             let Some(object) = map.object(sight.id) else { return };
             let counts = counts.entry(sight.id).or_default();
             if sight.begins {
@@ -100,21 +100,24 @@ impl Mapper {
     fn is_shown(&self, sight: &VisibleObject, object: &PriorObject, by_name: bool) -> bool {
         self.measurements.objects.iter().any(|measured| {
             let shows = |view: &ObjectBox| {
-                let outline = self.outline(&sight.pose, &object.quadric, view);
+                let outline = outline(&sight.pose, &object.quadric, view);
                 outline.is_some_and(|outline| outline.iou(&view.bounding_box) >= MIN_SHOWN_IOU)
             };
             let may_be = || match by_name {
                 true => measured.id == object.id,
                 false => measured.classes().is_compatible(&object.classes),
             };
-            measured.view(sight.frame).is_some_and(shows) && may_be()
+            let views = measured.views_in(sight.frame).iter();
+            let own = views.filter(|view| view.camera.index == sight.camera).any(shows);
+            own && may_be()
         })
     }
+}
 
-    fn outline(&self, pose: &Se3, quadric: &DualQuadric, view: &ObjectBox) -> Option<BoundingBox> {
-        let (bounding_box, camera) = (view.bounding_box, self.camera);
-        BoundingBoxFactor { bounding_box, camera, model: BoxModel::Truncated }.predict(pose, quadric)
-    }
+/// Returns the projection of a prior object in the image of a box, from the pose of its camera.
+fn outline(pose: &Se3, quadric: &DualQuadric, view: &ObjectBox) -> Option<BoundingBox> {
+    let (bounding_box, camera) = (view.bounding_box, view.camera.model);
+    BoundingBoxFactor { bounding_box, camera, model: BoxModel::Truncated }.predict(pose, quadric)
 }
 
 fn mean(of: impl Iterator<Item = f64>) -> Option<f64> {

@@ -1,5 +1,6 @@
 //! A frame as a line of JSON.
 use super::super::interpolation::PoseOrImage;
+use crate::camera::Cameras;
 use crate::measurement::Quantities;
 use crate::sequence::pose_graph::{PoseFactor, PoseGraphChanges};
 use crate::sequence::{Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, UnusedInput};
@@ -62,12 +63,15 @@ struct LineBox {
     scores: IndexMap<String, f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     object: Option<ObjectId>,
+    /// Name of the camera; `None` for the first one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    camera: Option<String>,
     #[serde(flatten)]
     quantities: IndexMap<String, Value>,
 }
 
 /// Fields of a box besides its measurements.
-const FIELDS: [&str; 5] = ["box", "class", "score", "scores", "object"];
+const FIELDS: [&str; 6] = ["box", "class", "score", "scores", "object", "camera"];
 
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -100,6 +104,7 @@ pub fn format_line(observation: &Observation) -> String {
             score: single.as_ref().map_or_else(certain_score, |(_, score)| *score),
             class: single.map(|(class, _)| class),
             object: detection.object,
+            camera: Some(detection.camera.name.clone()).filter(|_| detection.camera.index > 0),
             quantities: detection.quantities.to_fields().collect(),
         }
     };
@@ -159,17 +164,17 @@ fn read_noise(noise: Value) -> Result<Arc<Noise>, String> {
     Ok(Arc::new(noise))
 }
 
-/// Reads a frame from such a line.
+/// Reads a frame of these cameras from such a line.
 ///
 /// # Errors
 /// If the line is not a frame, or has no pose.
-pub fn parse(line: &[u8]) -> Result<Observation, String> {
-    let PoseOrImage { observation, has_pose, .. } = parse_line(line)?;
+pub fn parse(line: &[u8], cameras: &Cameras) -> Result<Observation, String> {
+    let PoseOrImage { observation, has_pose, .. } = parse_line(line, cameras)?;
     has_pose.then_some(observation).ok_or_else(|| "missing field `pose`".into())
 }
 
 /// Reads a pose, an image or both from a line.
-pub(super) fn parse_line(line: &[u8]) -> Result<PoseOrImage, String> {
+pub(super) fn parse_line(line: &[u8], cameras: &Cameras) -> Result<PoseOrImage, String> {
     let read = serde_json::from_slice(line).or_else(|error| match without_infinities(line) {
         Some(text) => serde_json::from_str(&text),
         None => Err(error),
@@ -179,7 +184,7 @@ pub(super) fn parse_line(line: &[u8]) -> Result<PoseOrImage, String> {
     let (mut detections, mut unused) = (vec![], vec![]);
     let (has_pose, is_image) = (pose.is_some(), boxes.is_some());
     for (place, value) in boxes.unwrap_or_default().into_iter().enumerate() {
-        match LineBox::read(value) {
+        match LineBox::read(value, cameras) {
             Ok(seen) => detections.push(seen),
             Err(fault) => unused.push(UnusedInput::Box { timestamp, place: place + 1, fault }),
         }
@@ -240,7 +245,7 @@ fn without_infinities(line: &[u8]) -> Option<String> {
 }
 
 impl LineBox {
-    fn read(value: Value) -> Result<Detection, String> {
+    fn read(value: Value, cameras: &Cameras) -> Result<Detection, String> {
         let seen: Self = serde_json::from_value(value).map_err(|error| error.to_string())?;
         if let Some((class, score)) = seen.scores.iter().find(|(_, score)| !(0.0..=1.0).contains(*score)) {
             return Err(format!("the score of `{class}` must be a number from 0 to 1, got {score}"));
@@ -249,21 +254,35 @@ impl LineBox {
             Some(class) if !seen.scores.is_empty() => {
                 Err(format!("a box has `class` and `score`, or `scores`, and not both: `{class}`"))
             }
-            _ => seen.into_detection(),
+            _ => seen.into_detection(cameras),
         }
     }
 
-    fn into_detection(self) -> Result<Detection, String> {
+    fn into_detection(self, cameras: &Cameras) -> Result<Detection, String> {
+        let camera = cameras.named(self.camera.as_deref())?.clone();
         let single = self.class.map(|class| (class, self.score.get()));
         let scores: ClassScores = self.scores.into_iter().chain(single).collect();
         let quantities = Quantities::read(self.quantities, &FIELDS)?;
-        Ok(Detection { frame: 0, object: self.object, scores, bounding_box: self.bounding_box, quantities })
+        let Self { object, bounding_box, .. } = self;
+        Ok(Detection { frame: 0, object, scores, camera, bounding_box, quantities })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use manifactor_quadric::Camera;
+
+    fn cameras() -> Cameras {
+        let model = Camera::new([500.0, 500.0, 320.0, 240.0], 640, 480).unwrap();
+        let mut cameras = Cameras::new(model);
+        cameras.add("left", model, Se3::identity());
+        cameras
+    }
+
+    fn parse(line: &[u8]) -> Result<Observation, String> {
+        super::parse(line, &cameras())
+    }
 
     #[test]
     fn scores_are_from_0_to_1_and_given_once() {
@@ -292,6 +311,18 @@ mod tests {
         let two =
             parse(line(r#"{"box": [1, 1, 5, 5], "scores": {"cup": 0.7, "bowl": 0.2}}"#).as_bytes()).unwrap();
         assert_eq!(two.detections[0].scores.iter().count(), 2);
+    }
+
+    #[test]
+    fn a_box_names_its_camera() {
+        let seen = |camera: &str| format!(r#"{{"box": [1, 1, 5, 5], "class": "cup"{camera}}}"#);
+        let boxes = [seen(""), seen(r#", "camera": "left""#), seen(r#", "camera": "right""#)].join(", ");
+        let read = line_with(&format!(r#""boxes": [{boxes}]"#));
+        assert_eq!(read.detections.iter().map(|seen| seen.camera.index).collect::<Vec<_>>(), [0, 1]);
+        let UnusedInput::Box { place, fault, .. } = &read.unused[0] else { panic!() };
+        assert!(*place == 3 && fault.contains("unknown camera `right`, expected one of `left`"), "{fault}");
+        let again = parse(format_line(&read).as_bytes()).unwrap();
+        assert_eq!(again.detections, read.detections);
     }
 
     const CLOSURE: &str = r#"{"id": "loop 1", "keys": [1.0, 7.5], "factor": {"type": "between_se3", "relative": {"translation": [1, 0, 0], "rotation": [0, 0, 0, 1]}}, "noise": {"sigma": 0.01}}"#;

@@ -40,7 +40,9 @@ fn classes_by_number_get_their_names_and_faulty_boxes_are_reported() {
         Ok((good, vec![("1".to_owned(), 70.0)])),
         Err("no centre".to_owned()),
     ];
-    let (images, rows, unused) = source.detections(&[image(boxes), image(vec![])]);
+    let camera = camera_of(&info("plumb_bob", &[]), true).unwrap().camera;
+    let first = crate::camera::Cameras::new(camera).first().clone();
+    let (images, rows, unused) = source.detections(&[image(boxes), image(vec![])], &first);
     assert_eq!((images.len(), rows.len(), unused.len()), (2, 1, 3));
     let classes: Vec<&str> = rows[0].1.scores.iter().map(|(class, _)| class).collect();
     assert_eq!(classes, ["cup", "7", "vase"]);
@@ -130,7 +132,7 @@ mod recordings {
         assert!(found.body_from_camera.unwrap().local(&mast().compose(&optical())).norm() < 1e-12);
         let seen = &found.detections[0];
         assert_eq!((seen.bounding_box.bounds(), seen.scores.best()), (CUP.0, Some(("cup", 0.8))));
-        assert_eq!((found.camera.fy, found.camera.width), (510.0, 640));
+        assert_eq!((found.cameras.first().model.fy, found.cameras.first().model.width), (510.0, 640));
     }
 
     #[test]

@@ -149,10 +149,11 @@ fn boxes(estimate: &Estimate) -> BTreeMap<usize, Vec<BoxRecord>> {
         landmarks.iter().map(|landmark| (landmark.object.id, landmark.quadric)).collect();
     let mut boxes: BTreeMap<usize, Vec<BoxRecord>> = BTreeMap::new();
     for object in &estimate.mapping.measurements.objects {
-        for view in &object.views {
+        // the page shows the images of the first camera
+        for view in object.views.iter().filter(|view| view.camera.index == 0) {
             let camera: Option<&Se3> = estimate.solution.values.get(pose_key(view.frame)).ok();
             let seen = camera.zip(quadrics.get(&object.id).copied());
-            let seen = BoxRecord::new(object.id, view.bounding_box, seen, &estimate.sequence.camera);
+            let seen = BoxRecord::new(object.id, view.bounding_box, seen, &view.camera.model);
             boxes.entry(view.frame).or_default().push(seen);
         }
     }

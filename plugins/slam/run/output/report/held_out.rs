@@ -75,9 +75,7 @@ impl HeldOutReport {
         let (mut unmapped, mut all) = (vec![], vec![]);
         let mut classes: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for detection in held_out {
-            let FilteredDetection::View(view) =
-                filter_detection(detection, &estimate.sequence.camera, &estimate.detections)
-            else {
+            let FilteredDetection::View(view) = filter_detection(detection, &estimate.detections) else {
                 continue;
             };
             let Some(object) = detection.object else { continue };
@@ -114,8 +112,8 @@ fn predict_box(estimate: &Estimate, object: ObjectId, view: &ObjectBox) -> Optio
     let values = &estimate.solution.values;
     let quadric = values.get::<DualQuadric>(object_key(object).as_str()).ok()?;
     let pose = values.get::<Se3>(pose_key(view.frame).as_str()).ok()?;
-    let (bounding_box, model, camera) =
-        (view.bounding_box, estimate.detections.model, estimate.sequence.camera);
+    let (bounding_box, model, camera) = (view.bounding_box, estimate.detections.model, view.camera.model);
+    let pose = &view.camera_pose(pose);
     let outline = BoundingBoxFactor { bounding_box, camera, model }.predict(pose, quadric);
     let outline = outline.filter(|_| quadric.is_in_front_of(pose));
     let pixels = outline.map(|outline| {

@@ -1,0 +1,89 @@
+//! The cameras of a sequence.
+use manifactor_geometry::{OnBody, OnBodyError, Se3};
+use manifactor_graph::Factor;
+use manifactor_quadric::Camera;
+use std::sync::Arc;
+
+/// A camera of a sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MountedCamera {
+    /// Name in the document; empty for the first camera.
+    pub name: String,
+    /// Position among the cameras of the sequence, 0 for the first.
+    pub index: usize,
+    /// The camera model.
+    pub model: Camera,
+    /// Pose in the frame of the first camera; `None` for the first camera itself.
+    pub first_from_camera: Option<Se3>,
+}
+
+impl MountedCamera {
+    /// Returns the pose of this camera from the pose of the first one.
+    pub fn pose(&self, world_from_first: &Se3) -> Se3 {
+        self.first_from_camera.map_or(*world_from_first, |pose| world_from_first.compose(&pose))
+    }
+
+    /// Returns a factor on the pose of the first camera, from a factor whose first variable is the pose of this one.
+    ///
+    /// # Errors
+    /// If the first variable is not a pose.
+    pub fn on_first(&self, factor: Arc<dyn Factor>) -> Result<Arc<dyn Factor>, OnBodyError> {
+        match self.first_from_camera {
+            None => Ok(factor),
+            Some(pose) => Ok(Arc::new(OnBody::new(factor, pose.inverse(), Some(vec![0]))?)),
+        }
+    }
+}
+
+/// All cameras of a sequence, at fixed poses on one body. The poses of frames are those of the first camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cameras {
+    first: Arc<MountedCamera>,
+    others: Vec<Arc<MountedCamera>>,
+}
+
+impl Cameras {
+    /// Creates the first camera.
+    pub fn new(model: Camera) -> Self {
+        let first = MountedCamera { name: String::new(), index: 0, model, first_from_camera: None };
+        Self { first: Arc::new(first), others: vec![] }
+    }
+
+    /// Adds a camera at a pose in the frame of the first one.
+    pub fn add(&mut self, name: impl Into<String>, model: Camera, first_from_camera: Se3) {
+        let (name, index) = (name.into(), self.others.len() + 1);
+        let camera = MountedCamera { name, index, model, first_from_camera: Some(first_from_camera) };
+        self.others.push(Arc::new(camera));
+    }
+
+    /// Returns the first camera.
+    pub fn first(&self) -> &Arc<MountedCamera> {
+        &self.first
+    }
+
+    /// Iterates over all cameras, the first one first.
+    pub fn iter(&self) -> impl Iterator<Item = &Arc<MountedCamera>> {
+        std::iter::once(&self.first).chain(&self.others)
+    }
+
+    /// Returns the camera with this name; `None` selects the first one.
+    ///
+    /// # Errors
+    /// If there is no such camera. The message lists the names.
+    pub fn named(&self, name: Option<&str>) -> Result<&Arc<MountedCamera>, String> {
+        let Some(name) = name else { return Ok(&self.first) };
+        self.others.iter().find(|camera| camera.name == name).ok_or_else(|| {
+            let names: Vec<String> = self.others.iter().map(|camera| format!("`{}`", camera.name)).collect();
+            match &names[..] {
+                [] => format!("unknown camera `{name}`: `source.cameras` declares none"),
+                _ => format!("unknown camera `{name}`, expected one of {}", names.join(", ")),
+            }
+        })
+    }
+}
+
+impl From<Camera> for Cameras {
+    fn from(model: Camera) -> Self {
+        Self::new(model)
+    }
+}

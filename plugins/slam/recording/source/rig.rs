@@ -1,0 +1,80 @@
+//! All cameras of a source, with the rectification of their boxes.
+use super::rectification::Rectification;
+use super::{CameraChoice, SourceError};
+use crate::camera::Cameras;
+use crate::sequence::{Detection, Observation, UnusedInput};
+use manifactor_geometry::Se3;
+use std::path::Path;
+
+/// All cameras of a source.
+#[derive(Debug)]
+pub(super) struct Rig {
+    pub(super) cameras: Cameras,
+    /// In the order of the cameras.
+    lenses: Vec<Rectification>,
+    /// Pose of the first camera on the body. `None`: it is the body.
+    body_from_first: Option<Se3>,
+}
+
+impl Rig {
+    /// Creates a rig with one camera, at a pose on the body whose poses the source gives.
+    pub(super) fn new(lens: Rectification, body_from_first: Option<Se3>) -> Self {
+        Self { cameras: Cameras::new(lens.camera), lenses: vec![lens], body_from_first }
+    }
+
+    /// Adds further cameras by name. Calibration files are relative to `folder`.
+    ///
+    /// # Errors
+    /// If a name is not a word, or a calibration file cannot be read.
+    pub(super) fn with<'a>(
+        mut self,
+        cameras: impl IntoIterator<Item = (&'a String, &'a CameraChoice, &'a Se3)>,
+        folder: &Path,
+    ) -> Result<Self, SourceError> {
+        for (name, camera, body_from_camera) in cameras {
+            let is_word = |c: char| c.is_alphanumeric() || ['_', '-'].contains(&c);
+            if name.is_empty() || !name.chars().all(is_word) {
+                return Err(SourceError::CameraName { name: name.clone() });
+            }
+            let lens = Rectification::new(camera, None, folder)?;
+            let first_from_camera = self
+                .body_from_first
+                .map_or(*body_from_camera, |first| first.inverse().compose(body_from_camera));
+            self.cameras.add(name, lens.camera, first_from_camera);
+            self.lenses.push(lens);
+        }
+        Ok(self)
+    }
+
+    /// Rectifies the boxes of a recording.
+    ///
+    /// # Errors
+    /// If a box has no place in the rectified image.
+    pub(super) fn apply(&self, detections: &mut [Detection]) -> Result<(), SourceError> {
+        detections.iter_mut().try_for_each(|detection| {
+            let (frame, bounds) = (detection.frame, detection.bounding_box.bounds());
+            self.rectify(detection).ok_or(SourceError::Distorted { frame, bounds })
+        })
+    }
+
+    /// Rectifies the boxes of one frame. Boxes without a place in the rectified image are left out and
+    /// reported.
+    pub(super) fn apply_to_frame(&self, observation: &mut Observation) {
+        let Observation { frame, detections, unused, .. } = observation;
+        let mut place = 0;
+        detections.retain_mut(|detection| {
+            place += 1;
+            let is_rectified = self.rectify(detection).is_some();
+            if !is_rectified {
+                let bounds = detection.bounding_box.bounds();
+                let fault = format!("{bounds:?} has no place in the rectified image of the camera");
+                unused.push(UnusedInput::Box { timestamp: frame.timestamp, place, fault });
+            }
+            is_rectified
+        });
+    }
+
+    fn rectify(&self, detection: &mut Detection) -> Option<()> {
+        self.lenses.get(detection.camera.index)?.rectify(&mut detection.bounding_box)
+    }
+}
