@@ -43,26 +43,17 @@ impl TrialStep {
     }
 }
 
-/// A minimum within the tolerance of the cost, from which steps continue to rounding error.
-struct Settled {
-    termination: Termination,
-    /// Index in the history of the step that reached it.
-    since: usize,
-}
-
-impl Settled {
-    /// Returns whether the last steps become shorter at a constant rate or faster: the longest one of their second
-    /// half is at most half as long as the longest one of their first half. In a valley, steps that hardly lower the
-    /// cost stay long.
-    fn is_reached(&self, history: &[IterationRecord]) -> bool {
-        const LAST_STEPS: usize = 16;
-        const MAX_SHARE: f64 = 0.5;
-        let accepted = history[self.since..].iter().rev().filter(|record| record.accepted);
-        let steps: Vec<f64> = accepted.take(LAST_STEPS).map(|record| record.step).collect();
-        let (last, before) = steps.split_at(steps.len() / 2);
-        let longest = |steps: &[f64]| steps.iter().copied().fold(0.0, f64::max);
-        longest(last) <= MAX_SHARE * longest(before)
-    }
+/// Returns whether the last accepted steps become shorter at a constant rate or faster: the longest one of their second
+/// half is at most half as long as the longest one of their first half. In a valley, steps that hardly lower the cost
+/// stay long.
+fn steps_become_shorter(history: &[IterationRecord]) -> bool {
+    const LAST_STEPS: usize = 16;
+    const MAX_SHARE: f64 = 0.5;
+    let accepted = history.iter().rev().filter(|record| record.accepted);
+    let steps: Vec<f64> = accepted.take(LAST_STEPS).map(|record| record.step).collect();
+    let (last, before) = steps.split_at(steps.len() / 2);
+    let longest = |steps: &[f64]| steps.iter().copied().fold(0.0, f64::max);
+    longest(last) <= MAX_SHARE * longest(before)
 }
 
 /// Result of a trial step.
@@ -117,7 +108,7 @@ pub struct Descent<'a> {
     /// Change of the cost by the last accepted step.
     change: f64,
     /// The minimum from which steps continue to rounding error.
-    settled: Option<Settled>,
+    settled: Option<Termination>,
     /// Diagonal of H at the initial estimate.
     initial_diagonal: Vec<f64>,
     observer: &'a mut dyn Observer,
@@ -261,8 +252,8 @@ impl<'a> Descent<'a> {
         } else if gradient <= *self.stop.gradient * self.unit() {
             Some(Termination::Converged { reason: Tolerance::Gradient })
         } else if self.iterations >= self.stop.max_iterations {
-            let settled = self.settled.as_ref().filter(|settled| settled.is_reached(&self.history));
-            Some(settled.map_or(Termination::MaxIterations, |settled| settled.termination.clone()))
+            let settled = self.settled.clone().filter(|_| steps_become_shorter(&self.history));
+            Some(settled.unwrap_or(Termination::MaxIterations))
         } else {
             None
         }
@@ -368,7 +359,7 @@ impl<'a> Descent<'a> {
         let reason = if self.interrupted {
             return Termination::Interrupted;
         } else if let Some(settled) = &self.settled {
-            return settled.termination.clone();
+            return settled.clone();
         } else if became_undefined > 0 {
             Stall::Domain
         } else if !cost.is_finite() {
@@ -390,10 +381,7 @@ impl<'a> Descent<'a> {
         let continues = *termination == Termination::Converged { reason: Tolerance::RelativeCost }
             && change.abs() > self.stop.exact_cost(self.problem.dim()) * self.at.cost.abs();
         if continues && self.settled.is_none() {
-            self.settled = Some(Settled {
-                termination: termination.clone(),
-                since: self.history.len().saturating_sub(1),
-            });
+            self.settled = Some(termination.clone());
         }
         !continues
     }
