@@ -101,6 +101,7 @@ impl OnBody {
         }
         let casts: Vec<_> = types.iter().filter_map(|id| as_variable(*id)).collect();
         let compiled = Dynamic::new(Compiled {
+            body_from_camera,
             camera_from_body: body_from_camera.inverse(),
             step: body_from_camera.adjoint(),
             moved: (0..types.len()).map(|place| places.contains(&place)).collect(),
@@ -113,10 +114,13 @@ impl OnBody {
         Ok(Self { document: Document { factor, body_from_camera, poses }, compiled })
     }
 
-    /// Returns the factor that an `on_body` factor contains, or the factor itself if it is of another type.
-    pub fn unwrapped(factor: &dyn Factor) -> &dyn Factor {
-        let compiled = factor.erased().as_any().downcast_ref::<Compiled>();
-        compiled.map_or(factor, |compiled| &*compiled.factor)
+    /// Returns the factor that an `on_body` factor contains, with the pose of the camera in the body frame. A factor of
+    /// another type is returned itself.
+    pub fn unwrapped(factor: &dyn Factor) -> (&dyn Factor, Option<&Se3>) {
+        match factor.erased().as_any().downcast_ref::<Compiled>() {
+            Some(compiled) => (&*compiled.factor, Some(&compiled.body_from_camera)),
+            None => (factor, None),
+        }
     }
 }
 
@@ -151,6 +155,7 @@ register!(dyn Factor, "on_body", OnBody);
 #[derive(Debug, Clone)]
 struct Compiled {
     factor: Arc<dyn Factor>,
+    body_from_camera: Se3,
     camera_from_body: Se3,
     /// Step of the body for a step of the camera: X exp(δ) E⁻¹ = X E⁻¹ exp(Ad(E) δ), E = body_from_camera.
     step: Matrix6<f64>,

@@ -1,5 +1,6 @@
 //! Batch estimation: map and trajectory of a whole sequence.
 mod completion;
+mod extrinsics;
 pub mod refine;
 pub mod variance;
 pub mod visibility;
@@ -9,6 +10,7 @@ use crate::estimate::variance::{MotionChoice, VarianceComponents, VarianceError,
 use crate::mapping::{MappedObject, Mapping, MappingError, pose_key};
 use crate::settings::{DetectionSettings, RunSettings};
 pub use completion::CompletionOutcome;
+pub use extrinsics::ExtrinsicsError;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Values};

@@ -8,6 +8,7 @@
     clippy::print_stderr
 )]
 mod association;
+mod cameras;
 mod completion;
 mod evo;
 mod ground_robots;

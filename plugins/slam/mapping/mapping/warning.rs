@@ -1,3 +1,4 @@
+use crate::estimate::ExtrinsicsError;
 use manifactor_config::{nearest, quoted_list};
 use manifactor_recording::journal::LostFrames;
 use manifactor_recording::sequence::jumps::OdometryJump;
@@ -93,6 +94,8 @@ pub enum Warning {
         /// Number of these boxes and those of mapped objects.
         boxes: usize,
     },
+    /// The boxes of a further camera contradict its pose on the body.
+    Extrinsics(ExtrinsicsError),
     /// The map has no objects.
     NoObjects {
         /// Number of detected objects.
@@ -229,6 +232,13 @@ impl fmt::Display for Warning {
                 "the estimated noise of the odometry, {rotation} rad and {translation} m, is the largest that is tried, as \
                  after a jump of the odometry; a robust `odometry.loss` reduces the weight of jumps, for example \
                  {{ type = \"geman_mcclure\", scale = 5.0 }}"
+            ),
+            Self::Extrinsics(ExtrinsicsError { camera, rotation, rotation_sigma }) => write!(
+                f,
+                "the boxes of the camera `{camera}` fit better if it is turned by {:.1}° ± {:.1}°: check \
+                 `source.cameras.{camera}.body_from_camera`",
+                rotation.to_degrees(),
+                rotation_sigma.to_degrees()
             ),
             Self::NotRobust => f.write_str(
                 "data association assigns some boxes to wrong objects, and without a loss they have full weight: \
