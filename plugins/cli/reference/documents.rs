@@ -3,7 +3,7 @@ use crate::input::graph_file;
 use crate::reference::fields::{Field, fields};
 use manifactor::config::Definitions;
 use manifactor::inertial::visual::VisualInertialDocument;
-use manifactor::slam::schema::{experiment_root, rules_root, run_root};
+use manifactor::slam::schema::{experiment_root, frame_root, rules_root, run_root};
 use serde_json::Value;
 
 /// A kind of document.
@@ -21,7 +21,7 @@ pub(crate) struct DocumentKind {
 }
 
 /// All kinds of documents, in the order of the reference.
-pub(crate) static DOCUMENTS: [DocumentKind; 5] = [
+pub(crate) static DOCUMENTS: [DocumentKind; 6] = [
     DocumentKind {
         name: "graph",
         title: "A literal graph",
@@ -103,6 +103,15 @@ tracks = "tracks.csv"
 camera = { fx = 458.7, fy = 457.3, cx = 367.2, cy = 248.4, width = 752, height = 480 }
 body_from_camera = { translation = [-0.022, -0.065, 0.01], rotation = [0.0, 0.0, 0.6, 0.8] }"#,
         root: |definitions| definitions.of::<VisualInertialDocument>(),
+    },
+    DocumentKind {
+        name: "frame",
+        title: "A frame of a stream",
+        about: "A line of JSON that the source `json_lines` reads. `manifactor online` maps frames as they arrive.",
+        example: r#"timestamp = 0.1
+pose = { translation = [0.0, 0.0, 0.0], rotation = [0.0, 0.0, 0.0, 1.0] }
+boxes = [{ box = [10.0, 20.0, 90.0, 80.0], class = "cup", score = 0.8 }]"#,
+        root: frame_root,
     },
 ];
 

@@ -4,6 +4,7 @@ use manifactor_config::{Definitions, graph_root};
 use manifactor_mapping::semantics::{RulesDocument, SemanticsDocument, SizesDocument};
 use manifactor_mapping::settings::RunSettings;
 use manifactor_mapping::settings::run_document::RunHeader;
+use manifactor_recording::source::FrameLine;
 use serde_json::{Value, json};
 
 /// The schema of a [`RunDocument`](manifactor_mapping::settings::run_document::RunDocument), with everything
@@ -43,6 +44,12 @@ pub fn rules_root(definitions: &mut Definitions) -> Value {
 pub fn experiment_root(definitions: &mut Definitions) -> Value {
     let root = definitions.of::<ExperimentDocument>();
     titled(root, "An experiment", "A run over a grid of settings and seeds.")
+}
+
+/// Returns the schema of a frame of a stream, one line of JSON. Its definitions are added to `definitions`.
+pub fn frame_root(definitions: &mut Definitions) -> Value {
+    let description = "A line of a stream, read by the source `json_lines`.";
+    titled(definitions.of::<FrameLine>(), "A frame of a stream", description)
 }
 
 fn titled(mut root: Value, title: &str, description: &str) -> Value {

@@ -5,7 +5,7 @@
 //! further quantities, each a [`Measurement`](measurement::Measurement).
 #[doc(hidden)]
 pub mod __private {
-    pub use {inventory, serde_json};
+    pub use {inventory, schemars, serde_json};
 }
 
 pub mod camera;

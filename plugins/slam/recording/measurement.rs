@@ -218,13 +218,20 @@ impl PartialEq for Quantities {
 pub struct MeasurementKind {
     /// Name of the field.
     pub name: &'static str,
+    /// Returns the schema of the value.
+    pub schema: fn() -> Value,
     /// Reads the value of the field.
     pub read: fn(Value) -> Result<Arc<dyn Measurement>, serde_json::Error>,
 }
 
 inventory::collect!(MeasurementKind);
 
-/// Registers a [`Measurement`](crate::measurement::Measurement) that serde can read:
+/// Returns the registered fields of a box with their schemas.
+pub(crate) fn measurement_schemas() -> impl Iterator<Item = (String, Value)> {
+    inventory::iter::<MeasurementKind>.into_iter().map(|kind| (kind.name.to_owned(), (kind.schema)()))
+}
+
+/// Registers a [`Measurement`](crate::measurement::Measurement) that serde can read and schemars can describe:
 /// `register_measurement!("depth", DepthMeasurement);`
 #[macro_export]
 macro_rules! register_measurement {
@@ -232,6 +239,7 @@ macro_rules! register_measurement {
         $crate::__private::inventory::submit! {
             $crate::measurement::MeasurementKind {
                 name: $name,
+                schema: || $crate::__private::schemars::schema_for!($type).to_value(),
                 read: |value| Ok(::std::sync::Arc::new($crate::__private::serde_json::from_value::<$type>(value)?)),
             }
         }

@@ -23,7 +23,7 @@ pub use camera::{CalibrationFile, CameraChoice};
 pub use detections::DetectionsFile;
 pub use interpolation::NoPose;
 pub use json_lines::parse;
-pub use json_lines::{FurtherCamera, JsonLines, format_line};
+pub use json_lines::{FrameLine, FurtherCamera, JsonLines, format_line};
 pub use mcap::{Mcap, McapError};
 pub use recorded::{FurtherRecordedCamera, RecordedFiles};
 pub use stream::FrameStream;

@@ -30,6 +30,8 @@ enum Choice {
     Rules,
     /// A visual-inertial recording, the input of `vio`.
     VisualInertial,
+    /// A frame of a stream, one line of JSON.
+    Frame,
 }
 
 impl Schema {
@@ -42,12 +44,15 @@ impl Schema {
             Choice::Experiment => kind("experiment"),
             Choice::Rules => kind("rules"),
             Choice::VisualInertial => kind("visual-inertial"),
+            Choice::Frame => kind("frame"),
         };
         let mut definitions = Definitions::new();
         let root = match one {
             Some(kind) => (kind.root)(&mut definitions),
             None => {
-                let any: Vec<Value> = DOCUMENTS.iter().map(|kind| (kind.root)(&mut definitions)).collect();
+                // a frame is a line, not a document
+                let documents = DOCUMENTS.iter().filter(|kind| kind.name != "frame");
+                let any: Vec<Value> = documents.map(|kind| (kind.root)(&mut definitions)).collect();
                 json!({ "title": "A document of Manifactor", "anyOf": any })
             }
         };

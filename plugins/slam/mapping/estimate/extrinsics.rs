@@ -84,6 +84,12 @@ impl Estimate {
         let axis = rotation.try_normalize(0.0)?;
         let sigma = axis.dot(&(covariance.fixed_view::<3, 3>(0, 0) * axis)).max(0.0).sqrt();
         let (rotation, rotation_sigma) = (rotation.norm(), sigma);
+        tracing::info!(
+            camera = camera.name,
+            "its boxes turn it by {:.2}° ± {:.2}°",
+            rotation.to_degrees(),
+            rotation_sigma.to_degrees()
+        );
         let is_wrong = rotation > MIN_ROTATION && rotation > MIN_ROTATION_SIGMAS * rotation_sigma;
         is_wrong.then(|| ExtrinsicsError { camera: camera.name.clone(), rotation, rotation_sigma })
     }

@@ -6,12 +6,13 @@ use manifactor_graph::checked::Positive;
 use manifactor_graph::{Factor, Residual};
 use manifactor_quadric::{CentroidDepth, DualQuadric};
 use nalgebra::SMatrix;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::sync::Arc;
 
 /// Distance of the object's centre along the optical axis, in metres.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct DepthMeasurement(pub Positive);
 

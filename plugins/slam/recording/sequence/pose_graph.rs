@@ -6,6 +6,7 @@ use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Factor, FactorEntry, Key, Manifold, Noise};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::sync::Arc;
@@ -29,7 +30,7 @@ pub struct PoseGraphChanges {
 }
 
 /// A factor that involves poses of frames, which its source knows by their timestamps.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoseFactor {
     /// Name by which a later frame can replace or remove the factor.
@@ -47,7 +48,8 @@ pub struct PoseFactor {
 }
 
 /// A variable of a [`PoseFactor`].
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, JsonSchema)]
+#[schemars(untagged)]
 pub enum PoseFactorKey {
     /// The pose of the frame at this timestamp. Unit: seconds.
     Timestamp(f64),

@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 mod line;
 
-pub use line::{format_line, parse};
+pub use line::{FrameLine, format_line, parse};
 
 /// Frames as lines of JSON, read one by one as they arrive: from standard input, or from a file.
 ///

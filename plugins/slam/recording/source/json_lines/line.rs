@@ -1,7 +1,7 @@
 //! A frame as a line of JSON.
 use super::super::interpolation::PoseOrImage;
 use crate::camera::Cameras;
-use crate::measurement::Quantities;
+use crate::measurement::{Quantities, measurement_schemas};
 use crate::sequence::pose_graph::{PoseFactor, PoseGraphChanges};
 use crate::sequence::{Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, UnusedInput};
 use indexmap::IndexMap;
@@ -11,72 +11,109 @@ use manifactor_graph::checked::Share;
 use manifactor_graph::{Manifold, Noise};
 use manifactor_quadric::BoundingBox;
 use nalgebra::Vector3;
+use schemars::{JsonSchema, Schema};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A frame in the form of a line.
-#[derive(Debug, Serialize, Deserialize)]
+// items that cannot be read are reported one by one, so lists of them are read as values first
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Line {
+#[schemars(rename = "Frame")]
+pub struct FrameLine {
     /// Timestamp. Unit: seconds.
     timestamp: f64,
+    /// Pose of the camera in the frame of the odometry; of the body, with `source.body_from_camera`. Required unless
+    /// `source.max_pose_gap` is set. Unit: metres; the rotation is a unit quaternion (x, y, z, w).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pose: Option<Se3>,
+    /// Boxes in the images of the frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Vec<LineBox>>")]
     boxes: Option<Vec<Value>>,
+    /// Readings of the accelerometer since the previous frame.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     accelerometer: Vec<AccelerometerReading>,
-    /// Noise of the step from the previous frame.
+    /// Noise of the step from the previous frame, rotation before translation. Default: `odometry.noise`, or its
+    /// estimate. Unit: radians, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Noise>")]
     odometry_noise: Option<Value>,
     /// New factors on poses.
     #[serde(default, skip_serializing_if = "is_empty")]
+    #[schemars(with = "Vec<PoseFactor>")]
     factors: Value,
     /// Ids of factors to remove.
     #[serde(default, skip_serializing_if = "is_empty")]
+    #[schemars(with = "Vec<String>")]
     removed: Value,
     /// Corrected poses of earlier frames.
     #[serde(default, skip_serializing_if = "is_empty")]
+    #[schemars(with = "Vec<CorrectedPose>")]
     corrected: Value,
 }
 
 /// A corrected pose of an earlier frame.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct CorrectedPose {
+    /// Timestamp of the frame. Unit: seconds.
     timestamp: f64,
+    /// The corrected pose, like `pose` of a frame.
     pose: Se3,
 }
 
 /// A box in the form of a line; `quantities` collects all further fields.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[schemars(transform = add_measurements)]
 struct LineBox {
+    /// Sides xmin, ymin, xmax, ymax. Unit: pixels.
     #[serde(rename = "box")]
     bounding_box: BoundingBox,
+    /// Class.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     class: Option<String>,
+    /// Score of the class, from 0 to 1.
     #[serde(default = "certain_score", skip_serializing_if = "is_certain")]
     score: Share,
+    /// Scores of several classes, each from 0 to 1, in place of `class` and `score`.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    #[schemars(with = "BTreeMap<String, f64>")]
     scores: IndexMap<String, f64>,
+    /// Id of the object that the box shows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<u32>")]
     object: Option<ObjectId>,
-    /// Name of the camera; `None` for the first one.
+    /// Name of a further camera in `source.cameras`. Default: the first camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     camera: Option<String>,
     #[serde(flatten)]
+    #[schemars(skip)]
     quantities: IndexMap<String, Value>,
+}
+
+/// Adds the registered measurements to the fields of a box.
+fn add_measurements(schema: &mut Schema) {
+    if let Some(fields) = schema.ensure_object().get_mut("properties").and_then(Value::as_object_mut) {
+        fields.extend(measurement_schemas());
+    }
+    schema.insert("additionalProperties".into(), false.into());
 }
 
 /// Fields of a box besides its measurements.
 const FIELDS: [&str; 6] = ["box", "class", "score", "scores", "object", "camera"];
 
-#[derive(Debug, Serialize, Deserialize)]
+/// A reading of the accelerometer.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct AccelerometerReading {
+    /// Timestamp. Unit: seconds.
     timestamp: f64,
+    /// Acceleration in the frame of the sensor; at rest it points up. Unit: m/s².
+    #[schemars(with = "[f64; 3]")]
     acceleration: Vector3<f64>,
 }
 
@@ -111,7 +148,7 @@ pub fn format_line(observation: &Observation) -> String {
     let of_reading =
         |r: &Acceleration| AccelerometerReading { timestamp: r.timestamp, acceleration: r.acceleration };
     let of_pose = |p: &StampedPose| CorrectedPose { timestamp: p.timestamp, pose: p.pose };
-    let line = Line {
+    let line = FrameLine {
         timestamp: observation.frame.timestamp,
         pose: Some(observation.frame.world_from_camera),
         boxes: Some(values_of(observation.detections.iter().map(of_box))),
@@ -179,7 +216,7 @@ pub(super) fn parse_line(line: &[u8], cameras: &Cameras) -> Result<PoseOrImage, 
         Some(text) => serde_json::from_str(&text),
         None => Err(error),
     });
-    let Line { timestamp, pose, boxes, accelerometer, odometry_noise, factors, removed, corrected } =
+    let FrameLine { timestamp, pose, boxes, accelerometer, odometry_noise, factors, removed, corrected } =
         read.map_err(|error: serde_json::Error| error.to_string())?;
     let (mut detections, mut unused) = (vec![], vec![]);
     let (has_pose, is_image) = (pose.is_some(), boxes.is_some());
