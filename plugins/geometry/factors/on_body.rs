@@ -5,15 +5,16 @@ use manifactor_graph::{
     AsVariable, Dynamic, DynamicBlocks, DynamicResidual, ErasedResidual, Factor, Variable, WrongRows,
     as_variable, register,
 };
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, MatrixXx6};
 use std::any::{Any, TypeId};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// A factor on the pose of a body, if the variable is the pose of a camera mounted on it.
 ///
 /// The factor gets world_from_body = world_from_camera · body_from_camera⁻¹. An example is a position from a
 /// satellite receiver, a loop closure between poses of a robot, or a box in the image of a second camera, which is then
-/// the body. Rows and noise are those of `factor`.
+/// the body. Rows and noise are those of `factor`. Without `body_from_camera`, that pose is a variable, the last one.
 ///
 /// ```toml
 /// [[factors]]
@@ -39,8 +40,9 @@ pub struct OnBody {
 struct Document {
     /// Factor with one or more variables of type `se3`.
     factor: Arc<dyn Factor>,
-    /// Pose of the camera in the body frame.
-    body_from_camera: Se3,
+    /// Pose of the camera in the body frame. Default: it is a further variable of type `se3`, the last one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    body_from_camera: Option<Se3>,
     /// Variables that are poses of the camera, as indices into `keys` from 0. Default: all of type `se3`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     poses: Option<Vec<usize>>,
@@ -72,18 +74,19 @@ pub enum OnBodyError {
 }
 
 impl OnBody {
-    /// Creates a factor on poses of a camera from a factor on poses of a body. `poses` are the indices of the
-    /// variables that are poses of the camera; `None` for all of type [`Se3`].
+    /// Creates a factor on poses of a camera from a factor on poses of a body. `body_from_camera` is the pose of the
+    /// camera on the body; with `None`, it is the last variable. `poses` are the indices of the variables that are poses
+    /// of the camera; `None` for all of type [`Se3`].
     ///
     /// # Errors
     /// If the factor has no such variables, has any number of variables, or has too many rows.
     pub fn new(
         factor: Arc<dyn Factor>,
-        body_from_camera: Se3,
+        body_from_camera: impl Into<Option<Se3>>,
         poses: Option<Vec<usize>>,
     ) -> Result<Self, OnBodyError> {
         let signature = factor.erased().signature();
-        let types = signature.variables;
+        let mut types = signature.variables;
         let found = || {
             let names = types.iter().map(|id| manifactor_graph::manifold_name(*id));
             names.collect::<Vec<_>>().join(", ") + if signature.many { ", …" } else { "" }
@@ -99,12 +102,15 @@ impl OnBody {
         if signature.many || places.is_empty() {
             return Err(OnBodyError::NoPoses { found: found() });
         }
+        let body_from_camera = body_from_camera.into();
+        let moved = (0..types.len()).map(|place| places.contains(&place)).collect();
+        if body_from_camera.is_none() {
+            types.push(TypeId::of::<Se3>());
+        }
         let casts: Vec<_> = types.iter().filter_map(|id| as_variable(*id)).collect();
         let compiled = Dynamic::new(Compiled {
-            body_from_camera,
-            camera_from_body: body_from_camera.inverse(),
-            step: body_from_camera.adjoint(),
-            moved: (0..types.len()).map(|place| places.contains(&place)).collect(),
+            extrinsics: body_from_camera.as_ref().map(Extrinsics::new),
+            moved,
             dimensions: casts.iter().map(|cast| cast.dimension).collect(),
             rows: signature.rows.unwrap_or(0),
             factor: factor.clone(),
@@ -114,13 +120,16 @@ impl OnBody {
         Ok(Self { document: Document { factor, body_from_camera, poses }, compiled })
     }
 
-    /// Returns the factor that an `on_body` factor contains, with the pose of the camera in the body frame. A factor of
-    /// another type is returned itself.
-    pub fn unwrapped(factor: &dyn Factor) -> (&dyn Factor, Option<&Se3>) {
-        match factor.erased().as_any().downcast_ref::<Compiled>() {
-            Some(compiled) => (&*compiled.factor, Some(&compiled.body_from_camera)),
-            None => (factor, None),
-        }
+    /// Returns the factor that an `on_body` factor contains, or the factor itself if it is of another type.
+    pub fn unwrapped(factor: &dyn Factor) -> &dyn Factor {
+        Self::content(factor).map_or(factor, |(inner, _)| &**inner)
+    }
+
+    /// Returns the factor that an `on_body` factor contains, with the pose of the camera on the body if it is constant.
+    /// `None` for other types.
+    pub fn content(factor: &dyn Factor) -> Option<(&Arc<dyn Factor>, Option<&Se3>)> {
+        let compiled = factor.erased().as_any().downcast_ref::<Compiled>()?;
+        Some((&compiled.factor, compiled.extrinsics.as_ref().map(|own| &own.body_from_camera)))
     }
 }
 
@@ -155,11 +164,9 @@ register!(dyn Factor, "on_body", OnBody);
 #[derive(Debug, Clone)]
 struct Compiled {
     factor: Arc<dyn Factor>,
-    body_from_camera: Se3,
-    camera_from_body: Se3,
-    /// Step of the body for a step of the camera: X exp(δ) E⁻¹ = X E⁻¹ exp(Ad(E) δ), E = body_from_camera.
-    step: Matrix6<f64>,
-    /// For each variable, whether it is a pose of the camera.
+    /// `None` if the pose of the camera is the last variable.
+    extrinsics: Option<Extrinsics>,
+    /// For each variable of `factor`, whether it is a pose of the camera.
     moved: Vec<bool>,
     types: Vec<TypeId>,
     dimensions: Vec<usize>,
@@ -167,16 +174,41 @@ struct Compiled {
     rows: usize,
 }
 
+/// Pose E of the camera in the body frame.
+#[derive(Debug, Clone)]
+struct Extrinsics {
+    body_from_camera: Se3,
+    camera_from_body: Se3,
+    /// Step of the body for a step of the camera: X exp(δ) E⁻¹ = X E⁻¹ exp(Ad(E) δ).
+    step: Matrix6<f64>,
+}
+
+impl Extrinsics {
+    fn new(body_from_camera: &Se3) -> Self {
+        let (camera_from_body, step) = (body_from_camera.inverse(), body_from_camera.adjoint());
+        Self { body_from_camera: *body_from_camera, camera_from_body, step }
+    }
+}
+
 impl Compiled {
+    /// Returns the pose of the camera on the body, constant or from the variables.
+    fn extrinsics(&self, variables: &[&dyn Any]) -> Option<Cow<'_, Extrinsics>> {
+        match &self.extrinsics {
+            Some(constant) => Some(Cow::Borrowed(constant)),
+            None => Some(Cow::Owned(Extrinsics::new(variables.last()?.downcast_ref()?))),
+        }
+    }
+
     /// Returns what `run` returns for the variables with poses of the body.
     fn with_body<R>(
         &self,
         variables: &[&dyn Any],
-        run: impl FnOnce(&dyn ErasedResidual, &[&dyn Variable]) -> R,
-    ) -> R {
+        run: impl FnOnce(&dyn ErasedResidual, &[&dyn Variable]) -> Option<R>,
+    ) -> Option<R> {
+        let extrinsics = self.extrinsics(variables)?;
         let body = |(variable, moved): (&&dyn Any, &bool)| {
             let pose = variable.downcast_ref::<Se3>().filter(|_| *moved)?;
-            Some(pose.compose(&self.camera_from_body))
+            Some(pose.compose(&extrinsics.camera_from_body))
         };
         let bodies: Vec<Option<Se3>> = variables.iter().zip(&self.moved).map(body).collect();
         let given = variables.iter().zip(&self.casts).map(|(x, to)| (to.cast)(*x));
@@ -214,13 +246,23 @@ impl DynamicResidual for Compiled {
         blocks: &mut DynamicBlocks,
     ) {
         let Some(linear) = self.with_body(variables, |factor, x| factor.linearize(x)) else { return };
+        let Some(extrinsics) = self.extrinsics(variables) else { return };
         residual.copy_from_slice(&linear.residual);
-        for (place, jacobian) in linear.jacobians.iter().enumerate().filter(|(place, _)| free[*place]) {
-            let block = blocks.block_mut(place);
-            match self.moved[place] {
-                true => block.copy_from_slice((jacobian * self.step).as_slice()),
-                false => block.copy_from_slice(jacobian.as_slice()),
+        // X (E exp(δ))⁻¹ = X E⁻¹ exp(-Ad(E) δ)
+        let mut by_extrinsics = MatrixXx6::zeros(self.rows);
+        for (place, jacobian) in linear.jacobians.iter().enumerate() {
+            let by_pose = self.moved[place].then(|| jacobian * extrinsics.step);
+            if let Some(by_pose) = &by_pose {
+                by_extrinsics -= by_pose;
             }
+            if free[place] {
+                let own = by_pose.as_ref().map_or(jacobian.as_slice(), MatrixXx6::as_slice);
+                blocks.block_mut(place).copy_from_slice(own);
+            }
+        }
+        let last = linear.jacobians.len();
+        if self.extrinsics.is_none() && free[last] {
+            blocks.block_mut(last).copy_from_slice(by_extrinsics.as_slice());
         }
     }
 }
@@ -246,9 +288,13 @@ mod tests {
             let outer = OnBody::new(Arc::new(inner.clone()), e, None).unwrap();
             let seen = outer.erased().residual(&[&a.compose(&e), &b.compose(&e)]).unwrap();
             let expected = inner.erased().residual(&[&a, &b]).unwrap();
-            let difference = Vector6::from_vec(seen) - Vector6::from_vec(expected);
+            let difference = Vector6::from_vec(seen) - Vector6::from_column_slice(&expected);
             prop_assert!(difference.norm() < 1e-9, "{difference}");
             JacobianLaw::default().check(&outer, &[&a.compose(&e), &b.compose(&e)]).unwrap();
+            let free = OnBody::new(Arc::new(inner), None, None).unwrap();
+            let same = free.erased().residual(&[&a.compose(&e), &b.compose(&e), &e]).unwrap();
+            prop_assert!((Vector6::from_vec(same) - Vector6::from_vec(expected)).norm() < 1e-9);
+            JacobianLaw::default().check(&free, &[&a.compose(&e), &b.compose(&e), &e]).unwrap();
         }
     }
 

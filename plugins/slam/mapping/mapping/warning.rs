@@ -233,12 +233,11 @@ impl fmt::Display for Warning {
                  after a jump of the odometry; a robust `odometry.loss` reduces the weight of jumps, for example \
                  {{ type = \"geman_mcclure\", scale = 5.0 }}"
             ),
-            Self::Extrinsics(ExtrinsicsError { camera, rotation, rotation_sigma }) => write!(
+            Self::Extrinsics(ExtrinsicsError { camera, rotation, gain }) => write!(
                 f,
-                "the boxes of the camera `{camera}` fit better if it is turned by {:.1}° ± {:.1}°: check \
-                 `source.cameras.{camera}.body_from_camera`",
-                rotation.to_degrees(),
-                rotation_sigma.to_degrees()
+                "the boxes of the camera `{camera}` fit better if it is turned by {:.1}° (gain in log-likelihood: \
+                 {gain:.0}): check `source.cameras.{camera}.body_from_camera`",
+                rotation.to_degrees()
             ),
             Self::NotRobust => f.write_str(
                 "data association assigns some boxes to wrong objects, and without a loss they have full weight: \

@@ -189,7 +189,6 @@ impl VariantReport {
         let before = landmarks::in_truth_frame(estimate, estimate.initial_landmarks());
         let objects = objects(estimate, &after);
         warnings.extend(super::shapes::shape_warnings(estimate));
-        warnings.extend(estimate.extrinsics_errors().into_iter().map(Warning::Extrinsics));
         let noise = estimate.components.last().and_then(|found| found.odometry);
         warnings.extend(noise.filter(MotionChoice::is_at_limit).map(|found| Warning::NoiseAtLimit {
             rotation: found.noise.rotation,

@@ -74,7 +74,7 @@ impl BoxComponent {
 
 /// Returns the box factor of an entry; `None` for other factors.
 pub(super) fn box_of(entry: &FactorEntry) -> Option<&BoundingBoxFactor> {
-    OnBody::unwrapped(&*entry.factor).0.erased().as_any().downcast_ref()
+    OnBody::unwrapped(&*entry.factor).erased().as_any().downcast_ref()
 }
 
 /// Returns width and height of the measured box; `None` for factors without a box.

@@ -41,7 +41,7 @@ pub(super) fn residuals(estimate: &Estimate) -> Vec<FactorResiduals> {
     let mut all: Vec<FactorResiduals> = vec![];
     for state in &estimate.solution.factors {
         let Some(entry) = estimate.mapping.graph.factors().get(state.entry) else { continue };
-        let name = OnBody::unwrapped(&*entry.factor).0.typetag_name();
+        let name = OnBody::unwrapped(&*entry.factor).typetag_name();
         let place = all.iter().position(|known| known.factor == name).unwrap_or_else(|| {
             let (factor, rows) = (name.to_owned(), vec![]);
             all.push(FactorResiduals { factor, count: 0, inactive: 0, weight: 0.0, rows });
@@ -74,7 +74,7 @@ impl<'a> FactorStates<'a> {
         for state in &estimate.solution.factors {
             let Some(entry) = estimate.mapping.graph.factors().get(state.entry) else { continue };
             for key in &entry.keys {
-                let name = OnBody::unwrapped(&*entry.factor).0.typetag_name();
+                let name = OnBody::unwrapped(&*entry.factor).typetag_name();
                 let of = (name, entry.keys.as_slice(), state);
                 by_key.entry(key).or_default().push(of);
             }
