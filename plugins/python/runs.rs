@@ -1,18 +1,25 @@
 //! Runs and experiments from their documents, and the command line.
 use crate::errors;
+use crate::input::to_python;
 use crate::solution::Watch;
 use crate::threads::detach;
 use manifactor::config::{Diagnostics, Document, Format};
+use manifactor::slam::estimate::Estimate;
 use manifactor::slam::experiment::{self, Experiment, ExperimentProgress, Shard, Trial, TrialLog};
+use manifactor::slam::online::{FrameError, FrameReport, Mapper, ObjectUpdates};
 use manifactor::slam::output::OutputFolder;
 use manifactor::slam::record::{RunRecord, VariantRecord};
-use manifactor::slam::run::Run;
-use manifactor::slam::run_document::RunDocument;
+use manifactor::slam::run::{Run, RunError, StreamWatcher};
+use manifactor::slam::run_document::{RunDocument, RunVariant};
+use manifactor::slam::sequence::Observation;
 use manifactor::slam::source::InputFolders;
 use manifactor::solve::Interrupt;
 use manifactor::viz::run_page;
 use manifactor_cli::{Failure, write_experiment};
 use pyo3::prelude::*;
+use serde_json::json;
+use std::io::{self, BufReader, Read};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -51,21 +58,150 @@ fn run(
     let read = open(&config, json, &set).and_then(|document| RunDocument::read(&document));
     let document = read.map_err(|error| errors::document(&error))?;
     let done = detach(py, || {
-        let mut run = Run::new(&document, data);
-        let (mut records, mut configs) = (vec![], vec![]);
-        for variant in &document.variants {
-            let (estimate, _) = run.run_variant(variant, &mut watch).map_err(|error| error.to_string())?;
-            records.push(VariantRecord::new(variant, &estimate));
-            configs.push(manifactor::config::to_toml(&variant.settings).map_err(|error| error.to_string())?);
-        }
-        let (report, record) = (run.finish(), RunRecord::new(&document.title, records));
-        let page = run_page(&report, &record, &configs);
-        let json = |value: Result<String, serde_json::Error>| value.map_err(|error| error.to_string());
-        let (told, table) = (serde_json::to_string(&report), serde_json::to_string(&report.table()));
-        Ok((json(told)?, json(table)?, json(serde_json::to_string(&record))?, page))
+        let batch = |variant: &RunVariant, run: &mut Run<'_>| {
+            run.run_variant(variant, &mut watch).map(|(estimate, _)| estimate)
+        };
+        report_of(Run::new(&document, data), &document, batch)
     })?;
     watch.finish()?;
     done.map_err(|error: String| errors::solve(error))
+}
+
+/// Maps the frames of an iterable of lines, or of the source, one by one; see [`run`] for the result.
+#[pyfunction]
+#[pyo3(signature = (config, json, set, data, lines = None, on_frame = None))]
+fn online(
+    py: Python<'_>,
+    config: PathBuf,
+    json: Option<String>,
+    set: Vec<String>,
+    data: Option<PathBuf>,
+    lines: Option<Py<PyAny>>,
+    on_frame: Option<Py<PyAny>>,
+) -> PyResult<Told> {
+    let mut watch = Watch::new(None);
+    let read = open(&config, json, &set).and_then(|document| RunDocument::read(&document));
+    let document = read.map_err(|error| errors::document(&error))?;
+    let done = detach(py, || {
+        let mut run = Run::new(&document, data);
+        if let Some(lines) = lines {
+            let lines = PythonLines { lines, pending: vec![], read: 0 };
+            run.read_frames_from("frames", Box::new(BufReader::new(lines)));
+        }
+        let mut frames = Frames { on_frame, objects: ObjectUpdates::default() };
+        let online = |variant: &RunVariant, run: &mut Run<'_>| {
+            run.run_variant_online(variant, &mut frames, &mut watch).map(|(estimate, _)| estimate)
+        };
+        report_of(run, &document, online)
+    })?;
+    watch.finish()?;
+    done.map_err(|error: String| errors::solve(error))
+}
+
+/// Runs all variants of a document, and returns their results.
+fn report_of(
+    mut run: Run<'_>,
+    document: &RunDocument,
+    mut estimate: impl FnMut(&RunVariant, &mut Run<'_>) -> Result<Estimate, RunError>,
+) -> Result<Told, String> {
+    let (mut records, mut configs) = (vec![], vec![]);
+    for variant in &document.variants {
+        let estimate = estimate(variant, &mut run).map_err(|error| error.to_string())?;
+        records.push(VariantRecord::new(variant, &estimate));
+        configs.push(manifactor::config::to_toml(&variant.settings).map_err(|error| error.to_string())?);
+    }
+    let (report, record) = (run.finish(), RunRecord::new(&document.title, records));
+    let page = run_page(&report, &record, &configs);
+    let json = |value: Result<String, serde_json::Error>| value.map_err(|error| error.to_string());
+    let (told, table) = (serde_json::to_string(&report), serde_json::to_string(&report.table()));
+    Ok((json(told)?, json(table)?, json(serde_json::to_string(&record))?, page))
+}
+
+/// Lines of a Python iterator. An exception ends them, and is raised after the run.
+struct PythonLines {
+    lines: Py<PyAny>,
+    pending: Vec<u8>,
+    read: usize,
+}
+
+impl Read for PythonLines {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.read == self.pending.len() {
+            let next = Python::attach(|py| {
+                let next = self.lines.bind(py).try_iter()?.next();
+                next.transpose()?.map(|line| line.extract::<String>()).transpose()
+            });
+            match next {
+                Ok(None) => return Ok(0),
+                Ok(Some(line)) => (self.pending, self.read) = ((line + "\n").into_bytes(), 0),
+                Err(error) => {
+                    crate::raised::store_exception(error);
+                    return Err(io::Error::other("the frames raised an exception"));
+                }
+            }
+        }
+        let mut rest = &self.pending[self.read..];
+        let read = rest.read(buffer)?;
+        self.read += read;
+        Ok(read)
+    }
+}
+
+/// Passes each frame to a Python function.
+struct Frames {
+    on_frame: Option<Py<PyAny>>,
+    objects: ObjectUpdates,
+}
+
+impl Frames {
+    /// Returns `Break` after an exception, or if the function returned `False`.
+    fn flow(goes_on: PyResult<bool>) -> ControlFlow<()> {
+        match goes_on {
+            Ok(true) if !crate::raised::has_raised() => ControlFlow::Continue(()),
+            Ok(_) => ControlFlow::Break(()),
+            Err(error) => {
+                crate::raised::store_exception(error);
+                ControlFlow::Break(())
+            }
+        }
+    }
+
+    fn call(&self, update: &serde_json::Value) -> PyResult<bool> {
+        Python::attach(|py| {
+            py.check_signals()?;
+            let Some(on_frame) = &self.on_frame else { return Ok(true) };
+            let goes_on = on_frame.bind(py).call1((to_python(py, update)?,))?;
+            // a function that returns None does not end the stream
+            Ok(goes_on.is_none() || goes_on.is_truthy()?)
+        })
+    }
+}
+
+impl StreamWatcher for Frames {
+    fn on_idle(&mut self) -> ControlFlow<()> {
+        Self::flow(Python::attach(|py| py.check_signals().map(|()| true)))
+    }
+
+    fn on_frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        _observation: Option<&Observation>,
+        mapper: &mut Mapper,
+        seconds: f64,
+    ) -> ControlFlow<()> {
+        let update = match report {
+            Ok(report) => json!({ "seconds": seconds, "report": report, "map": self.objects.take(mapper) }),
+            Err(error) => json!({ "seconds": seconds, "error": error.to_string() }),
+        };
+        Self::flow(self.call(&update))
+    }
+
+    fn on_end(&mut self, mapper: &mut Mapper) {
+        let changed = self.objects.take(mapper);
+        if !changed.is_empty() {
+            _ = Self::flow(self.call(&json!({ "map": changed })));
+        }
+    }
 }
 
 /// Runs the unfinished trials of an experiment and writes its tables, pictures and page. Returns the
@@ -217,6 +353,7 @@ fn main(py: Python<'_>, arguments: Vec<String>) -> PyResult<u8> {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(run, module)?)?;
+    module.add_function(wrap_pyfunction!(online, module)?)?;
     module.add_function(wrap_pyfunction!(experiment_of, module)?)?;
     module.add_class::<Sweep>()?;
     module.add_function(wrap_pyfunction!(main, module)?)

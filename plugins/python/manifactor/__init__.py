@@ -29,7 +29,7 @@ from .groups import Group
 from .frames import poses, rotations, to_pandas
 from .logs import enable_logging
 from .losses import *
-from .report import Report, Summary, experiment, run, written
+from .report import Report, Summary, experiment, online, run, written
 from .solvers import auto, dogleg, gauss_newton, gnc, levenberg_marquardt
 from .traced import Check, TracedFactor, check_factor, factor
 from .variables import *
@@ -81,6 +81,7 @@ __all__ = [
     "levenberg_marquardt",
     "load",
     "losses",
+    "online",
     "poses",
     "require",
     "rotations",

@@ -344,6 +344,14 @@ def run(
     data: str | None,
     observer: Callable[[dict[str, Any]], bool | None] | None = None,
 ) -> tuple[str, str, str, str]: ...
+def online(
+    config: str,
+    json: str | None,
+    set: Sequence[str],
+    data: str | None,
+    lines: Iterator[str] | None = None,
+    on_frame: Callable[[dict[str, Any]], bool | None] | None = None,
+) -> tuple[str, str, str, str]: ...
 def experiment(
     config: str,
     json: str | None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -158,7 +158,7 @@ def toml(value: Any) -> str:
 def opened(config: Config, name: str) -> tuple[str, str | None]:
     """Returns the path of a document, and its text if there is no file."""
     if isinstance(config, Mapping):
-        return name, json.dumps(config, default=lambda value: value.to_dict() if hasattr(value, "to_dict") else os.fspath(value))
+        return name, json.dumps(config, default=plain)
     return os.fspath(config), None
 
 
@@ -183,6 +183,34 @@ def run(
     path, text = opened(config, "run")
     report, table, record, page = _native.run(path, text, overrides(set), data_folder(data), observer)
     return Report(json.loads(report), json.loads(table), json.loads(record), page)
+
+
+def online(
+    config: Config,
+    frames: Iterable[Mapping[str, Any] | str] | None = None,
+    *,
+    on_frame: Callable[[dict[str, Any]], bool | None] | None = None,
+    set: Mapping[str, Any] | Sequence[str] = (),
+    data: str | os.PathLike[str] | None = None,
+) -> Report:
+    """Maps the run of a document frame by frame in memory, and solves the whole graph at the end.
+
+    `frames` are dicts or lines of JSON in the form of `manifactor schema frame`, for a document whose source is
+    `json_lines`. Default: the frames of the source. `on_frame` is called after each frame with a dict: the `report` of the
+    frame, with its pose and the objects of its boxes; in `map`, the objects that have changed; or the `error` of a frame
+    that was rejected. It ends the stream by returning `False`. `set` and `data` are those of :func:`run`.
+    """
+    path, text = opened(config, "run")
+    lines = None if frames is None else (frame if isinstance(frame, str) else json.dumps(frame, default=plain) for frame in frames)
+    report, table, record, page = _native.online(path, text, overrides(set), data_folder(data), lines, on_frame)
+    return Report(json.loads(report), json.loads(table), json.loads(record), page)
+
+
+def plain(value: Any) -> Any:
+    """Converts values of this package, arrays and paths for JSON."""
+    if hasattr(value, "to_dict"):
+        return value.to_dict()
+    return value.tolist() if hasattr(value, "tolist") else os.fspath(value)
 
 
 class Summary:

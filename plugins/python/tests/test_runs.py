@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -121,3 +122,62 @@ def test_the_log_goes_to_python() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert "INFO manifactor.solve converged" in done.stdout, done.stdout + done.stderr
+
+
+LIVE: dict[str, Any] = {
+    "source": {"type": "json_lines", "camera": {"fx": 500, "fy": 500, "cx": 320, "cy": 240, "width": 640, "height": 480}},
+    "objects": {"initialiser": {"type": "rays"}},
+    "association": {"type": "likelihood"},
+    "semantics": [],
+}
+
+
+def frames_of_a_ball() -> Iterator[dict[str, Any]]:
+    """A camera moves to the right and sees one ball of 0.2 m, 2 m ahead."""
+    for i in range(20):
+        x = 0.05 * i
+        centre, half = np.arctan2(-x, 2), np.arcsin(0.1 / np.hypot(x, 2))
+        left, right = 320 + 500 * np.tan([centre - half, centre + half])
+        high = 500 * 0.1 / np.sqrt(4 - 0.01)
+        box = np.array([left, 240 - high, right, 240 + high])
+        pose = mf.Se3(translation=[x, 0, 0], rotation=[0, 0, 0, 1])
+        as_json = {"translation": pose.translation, "rotation": pose.rotation}
+        yield {"timestamp": float(i), "pose": as_json, "boxes": [{"box": box, "class": "ball"}]}
+
+
+def test_frames_of_a_program_are_mapped_one_by_one() -> None:
+    updates: list[dict[str, Any]] = []
+    report = mf.online(LIVE, frames_of_a_ball(), on_frame=updates.append)
+    assert report.complete and report[0].report["counts"]["objects"] == 1
+    assert [update["report"]["frame"] for update in updates[:20]] == list(range(20))
+    states = [thing["state"] for update in updates for thing in update["map"]]
+    assert states[0] == "tentative" and "mapped" in states
+    centre = next(thing["quadric"]["translation"] for update in reversed(updates) for thing in update["map"])
+    np.testing.assert_allclose(centre, [0, 0, 2], atol=0.02)
+
+
+def test_a_frame_that_is_none_is_reported_and_the_rest_is_mapped() -> None:
+    frames = list(frames_of_a_ball())
+    updates: list[dict[str, Any]] = []
+    report = mf.online(LIVE, [*frames[:3], {"pose": None}, "{", *frames[3:]], on_frame=updates.append)
+    faults = [update["error"] for update in updates if "error" in update]
+    assert len(faults) == 2 and "frames, line 4" in faults[0] and report[0].report["counts"]["frames"] == 20
+
+
+def test_a_stream_ends_with_its_function_or_an_exception() -> None:
+    report = mf.online(LIVE, frames_of_a_ball(), on_frame=lambda update: update["report"]["frame"] < 11)
+    assert not report.complete and report[0].report["counts"]["frames"] == 12
+
+    def fail(update: dict[str, Any]) -> None:
+        raise ValueError("of the function")
+
+    def broken() -> Iterator[dict[str, Any]]:
+        yield from frames_of_a_ball()
+        raise ValueError("of the frames")
+
+    with pytest.raises(ValueError, match="of the function"):
+        mf.online(LIVE, frames_of_a_ball(), on_frame=fail)
+    with pytest.raises(ValueError, match="of the frames"):
+        mf.online(LIVE, broken())
+    with pytest.raises(mf.SolveError, match="need `source.type = \"json_lines\"`, got `simulated`"):
+        mf.online({"source": {"type": "simulated"}}, frames_of_a_ball())

@@ -3,6 +3,7 @@ use crate::sequence::{ObjectId, Sequence};
 use manifactor_config::Diagnostics;
 use manifactor_formats::FormatError;
 use std::fmt::Debug;
+use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 mod assemble;
@@ -24,7 +25,7 @@ pub use detections::DetectionsFile;
 pub use interpolation::NoPose;
 pub use json_lines::parse;
 pub use json_lines::{FrameLine, FurtherCamera, JsonLines, format_line};
-pub use mcap::{Mcap, McapError};
+pub use mcap::{FurtherMcapCamera, Mcap, McapError};
 pub use recorded::{FurtherRecordedCamera, RecordedFiles};
 pub use stream::FrameStream;
 pub use tum::TumRgbd;
@@ -43,6 +44,20 @@ pub trait SequenceSource: Debug + Send + Sync {
     /// # Errors
     /// Missing files.
     fn open(&self, _folders: &InputFolders) -> Result<Option<FrameStream>, SourceError> {
+        Ok(None)
+    }
+
+    /// Opens the sequence as a stream of the lines of `reader`, in place of the file that it names; `None` if it does not
+    /// read lines. `name` is the name of the reader in messages.
+    ///
+    /// # Errors
+    /// Missing files.
+    fn open_reader(
+        &self,
+        _folders: &InputFolders,
+        _name: &str,
+        _reader: Box<dyn BufRead + Send>,
+    ) -> Result<Option<FrameStream>, SourceError> {
         Ok(None)
     }
 

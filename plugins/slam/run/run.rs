@@ -13,6 +13,8 @@ use manifactor_recording::sequence::{Detection, Sequence};
 use manifactor_recording::source::{InputFolders, SourceError};
 use manifactor_solve::{Observer, Termination};
 use std::borrow::Cow;
+use std::fmt;
+use std::io::BufRead;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -56,6 +58,17 @@ pub enum RunError {
     /// A journal for a run with several variants.
     #[error("a journal is that of one variant: name another document, or leave all others out")]
     JournalOfVariants,
+    /// Frames from a program for a run with several variants.
+    #[error(
+        "frames that a program gives are those of one variant: name another document, or leave all others out"
+    )]
+    FramesOfVariants,
+    /// Frames from a program for a source that does not read lines.
+    #[error("frames that a program gives need `source.type = \"json_lines\"`, got `{source_type}`")]
+    NoLines {
+        /// Type of the source.
+        source_type: &'static str,
+    },
     /// Data association rejected every frame.
     #[error("no frame can be mapped, all are rejected; the first: {0}")]
     NoFrameMapped(FrameError),
@@ -140,21 +153,48 @@ pub struct Run<'a> {
     folders: InputFolders,
     loaded: Vec<(String, Arc<Sequence>)>,
     journal: Option<PathBuf>,
+    reader: Option<Reader>,
     began: Instant,
     reports: Vec<VariantReport>,
+}
+
+/// Lines of a stream, in place of those of the source.
+struct Reader {
+    name: String,
+    lines: Box<dyn BufRead + Send>,
+}
+
+impl fmt::Debug for Reader {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Reader").field("name", &self.name).finish_non_exhaustive()
+    }
 }
 
 impl<'a> Run<'a> {
     /// Starts a run. `data` is the folder of public data sets.
     pub fn new(document: &'a RunDocument, data: Option<PathBuf>) -> Self {
         let folders = InputFolders { data, document: document.folder.clone() };
-        Self { document, folders, loaded: vec![], journal: None, began: Instant::now(), reports: vec![] }
+        Self {
+            document,
+            folders,
+            loaded: vec![],
+            journal: None,
+            reader: None,
+            began: Instant::now(),
+            reports: vec![],
+        }
     }
 
     /// Keeps the frames of a stream in a file, and begins with those that it has; see
     /// [`journal`](manifactor_recording::journal).
     pub fn journal_frames(&mut self, journal: PathBuf) {
         self.journal = Some(journal);
+    }
+
+    /// Reads the frames of a stream from `reader`, in place of the file that the source names. `name` is its name in
+    /// messages.
+    pub fn read_frames_from(&mut self, name: impl Into<String>, reader: Box<dyn BufRead + Send>) {
+        self.reader = Some(Reader { name: name.into(), lines: reader });
     }
 
     /// Checks that the input files of a variant exist, without reading them.
@@ -209,9 +249,17 @@ impl<'a> Run<'a> {
         observer: &mut dyn Observer,
     ) -> Result<(Estimate, VariantReport), RunError> {
         let clock = Instant::now();
-        let stream = match variant.settings.source.open(&self.folders)? {
-            Some(stream) => stream,
-            None => self.sequence(variant)?.into(),
+        let source = &variant.settings.source;
+        let stream = match self.reader.take() {
+            Some(_) if self.document.variants.len() > 1 => return Err(RunError::FramesOfVariants),
+            Some(Reader { name, lines }) => {
+                let stream = source.open_reader(&self.folders, &name, lines)?;
+                stream.ok_or_else(|| RunError::NoLines { source_type: source.typetag_name() })?
+            }
+            None => match source.open(&self.folders)? {
+                Some(stream) => stream,
+                None => self.sequence(variant)?.into(),
+            },
         };
         let stream = match &self.journal {
             Some(_) if self.document.variants.len() > 1 => return Err(RunError::JournalOfVariants),

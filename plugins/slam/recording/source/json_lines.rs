@@ -128,11 +128,42 @@ impl SequenceSource for JsonLines {
     fn open(&self, folders: &InputFolders) -> Result<Option<FrameStream>, SourceError> {
         Ok(Some(self.open_lines(folders)?))
     }
+
+    fn open_reader(
+        &self,
+        folders: &InputFolders,
+        name: &str,
+        reader: Box<dyn BufRead + Send>,
+    ) -> Result<Option<FrameStream>, SourceError> {
+        Ok(Some(self.stream(folders, name.into(), reader)?))
+    }
 }
 register!(dyn SequenceSource, "json_lines", JsonLines);
 
 impl JsonLines {
     fn open_lines(&self, folders: &InputFolders) -> Result<FrameStream, SourceError> {
+        let (file, reader): (_, Box<dyn BufRead + Send>) = match &self.file {
+            Some(file) => {
+                let file = folders.beside_document(file);
+                let opened =
+                    File::open(&file).map_err(|source| FormatError::Io { path: file.clone(), source })?;
+                (file, Box::new(BufReader::new(opened)))
+            }
+            None if STDIN_IS_READ.swap(true, Ordering::Relaxed) => {
+                return Err(SourceError::ReadBefore { file: STDIN_NAME.into() });
+            }
+            None => (STDIN_NAME.into(), Box::new(BufReader::new(stdin()))),
+        };
+        self.stream(folders, file, reader)
+    }
+
+    /// Returns the frames of a reader. `file` is its name in messages.
+    fn stream(
+        &self,
+        folders: &InputFolders,
+        file: PathBuf,
+        reader: Box<dyn BufRead + Send>,
+    ) -> Result<FrameStream, SourceError> {
         let truth = self.ground_truth.as_deref().map(|file| read_ground_truth(&folders.document, Some(file)));
         let mut ground_truth = truth.transpose()?.flatten();
         let extrinsics = self.body_from_camera.map(Extrinsics::new);
@@ -149,18 +180,6 @@ impl JsonLines {
             body_from_camera: self.body_from_camera,
             up: self.up,
             ground_truth,
-        };
-        let (file, reader): (_, Box<dyn BufRead + Send>) = match &self.file {
-            Some(file) => {
-                let file = folders.beside_document(file);
-                let opened =
-                    File::open(&file).map_err(|source| FormatError::Io { path: file.clone(), source })?;
-                (file, Box::new(BufReader::new(opened)))
-            }
-            None if STDIN_IS_READ.swap(true, Ordering::Relaxed) => {
-                return Err(SourceError::ReadBefore { file: STDIN_NAME.into() });
-            }
-            None => (STDIN_NAME.into(), Box::new(BufReader::new(stdin()))),
         };
         let needs_pose = self.max_pose_gap.is_none();
         let lines =

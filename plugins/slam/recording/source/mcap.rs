@@ -6,7 +6,7 @@ use super::extrinsics::Extrinsics;
 use super::rectification::Rectification;
 use super::rig::Rig;
 use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
-use crate::camera::MountedCamera;
+use crate::camera::{Cameras, MountedCamera};
 use crate::sequence::{ClassScores, Detection, Sequence, UnusedInput};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -14,14 +14,18 @@ use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::{BoundingBox, Camera};
 use manifactor_ros::messages::CameraInfo;
-use manifactor_ros::{BagError, Contents, Role, TransformError};
-use recorded_messages::{BoxesOfImage, RecordedMessages};
+use manifactor_ros::{Contents, Role};
+use recorded_messages::{BoxesOfImage, Calibration, RecordedMessages};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+mod error;
 mod recorded_messages;
+
+pub use error::McapError;
 
 /// A recording of a robot that runs ROS 2, as an MCAP file.
 ///
@@ -72,6 +76,9 @@ pub struct Mcap {
     /// Pose of the camera in the frame of the body, in place of transforms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_from_camera: Option<Se3>,
+    /// Further cameras on the body, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub cameras: BTreeMap<String, FurtherMcapCamera>,
     /// Names of the classes by their number from 0, for a detector that gives numbers.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub classes: Vec<String>,
@@ -91,105 +98,28 @@ pub struct Mcap {
     pub up: Option<Direction>,
 }
 
-fn pose_gap() -> Positive {
-    Positive::literal(0.5)
+/// A further camera in a recording, at a constant pose on the body.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FurtherMcapCamera {
+    /// Topic of its boxes. Cameras with one topic differ in `camera_frame`.
+    pub detections: String,
+    /// Topic of its calibration. Default: the only one with the frame of its boxes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_info: Option<String>,
+    /// The camera in place of a topic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraChoice>,
+    /// Frame of the camera. Default: that of its boxes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_frame: Option<String>,
+    /// Pose of the camera in the frame of the body, in place of transforms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_from_camera: Option<Se3>,
 }
 
-/// Error that prevents reading a sequence from a recording.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum McapError {
-    /// The recording cannot be read.
-    #[error(transparent)]
-    Bag(#[from] BagError),
-    /// No topic has messages of the needed types.
-    #[error("{}: no topic has messages of {types}; {instead}. Topics: {topics}", file.display())]
-    NoTopic {
-        /// The recording.
-        file: PathBuf,
-        /// The types.
-        types: String,
-        /// Setting that supplies the data in another way.
-        instead: &'static str,
-        /// All topics with their types.
-        topics: String,
-    },
-    /// Several topics could be meant.
-    #[error("{}: several topics have messages of {types}: set `source.{setting}` to one of {topics}", file.display())]
-    SeveralTopics {
-        /// The recording.
-        file: PathBuf,
-        /// The types.
-        types: String,
-        /// The setting.
-        setting: &'static str,
-        /// The topics.
-        topics: String,
-    },
-    /// A setting names a topic that does not exist or has a different type.
-    #[error("{}: `source.{setting}` names `{topic}`, which {fault}. Topics: {topics}", file.display())]
-    WrongTopic {
-        /// The recording.
-        file: PathBuf,
-        /// The setting.
-        setting: &'static str,
-        /// The topic.
-        topic: String,
-        /// The fault.
-        fault: String,
-        /// All topics with their types.
-        topics: String,
-    },
-    /// A frame has no name.
-    #[error("{}: the messages of `{topic}` do not name {what}: set `source.{setting}`, or `source.body_from_camera`", file.display())]
-    NoFrame {
-        /// The recording.
-        file: PathBuf,
-        /// The topic.
-        topic: String,
-        /// The frame.
-        what: &'static str,
-        /// The setting.
-        setting: &'static str,
-    },
-    /// The boxes come from several cameras.
-    #[error("{}: the boxes of `{topic}` come from several cameras, {cameras}: set `source.camera_frame` to one of them", file.display())]
-    SeveralCameras {
-        /// The recording.
-        file: PathBuf,
-        /// The topic.
-        topic: String,
-        /// Their frames.
-        cameras: String,
-    },
-    /// The pose of the camera on the body is not known.
-    #[error("{}: the pose of the camera is not known: {source}; `source.body_from_camera` can give it", file.display())]
-    NoTransform {
-        /// The recording.
-        file: PathBuf,
-        /// The reason.
-        source: TransformError,
-    },
-    /// All poses are missing or cannot be used.
-    #[error("{}: `{topic}` has no pose that can be used{why}", file.display())]
-    NoPoses {
-        /// The recording.
-        file: PathBuf,
-        /// The topic.
-        topic: String,
-        /// The reason, with a colon before it.
-        why: String,
-    },
-    /// The calibration cannot be used.
-    #[error("{}: the calibration in `{topic}` cannot be used: {fault}; `source.camera` can give the camera", file.display())]
-    Camera {
-        /// The recording.
-        file: PathBuf,
-        /// The topic.
-        topic: String,
-        /// The fault.
-        fault: String,
-    },
+fn pose_gap() -> Positive {
+    Positive::literal(0.5)
 }
 
 #[typetag::serialize(name = "mcap")]
@@ -201,19 +131,23 @@ impl SequenceSource for Mcap {
             None => None,
         };
         let messages = RecordedMessages::read(self, &file)?;
-        let lens = self.camera(&file, &messages, folders)?;
+        let lens = self.lens(&file, self.camera.as_ref(), messages.calibrations.first(), folders)?;
         let (poses, body_from_camera) = self.camera_poses(&file, &messages)?;
         if let (Some(pose), Some(truth)) = (body_from_camera, &mut ground_truth) {
             Extrinsics::new(pose).apply_to_ground_truth(truth);
         }
-        let rig = Rig::new(lens, body_from_camera);
-        let (images, rows, mut unused) = match &self.detections_file {
-            Some(rows) => {
-                let rows = rows.read(&folders.document, rig.cameras.first())?;
-                (rows.iter().map(|(timestamp, _)| *timestamp).collect(), rows, vec![])
-            }
-            None => self.detections(&messages.boxes, rig.cameras.first()),
-        };
+        let mut rig = Rig::new(lens, body_from_camera);
+        for (i, (name, further)) in self.cameras.iter().enumerate() {
+            let calibration = messages.calibrations.get(i + 1);
+            let lens = self.lens(&file, further.camera.as_ref(), calibration, folders)?;
+            rig.add(name, lens, self.further_pose(&file, &messages, i + 1, further)?)?;
+        }
+        let (mut images, mut rows, mut unused) = self.detections(&messages.boxes, &rig.cameras);
+        if let Some(file) = &self.detections_file {
+            let of_file = file.read(&folders.document, rig.cameras.first())?;
+            images.extend(of_file.iter().map(|(timestamp, _)| *timestamp));
+            rows.extend(of_file);
+        }
         let by = TimeMatching {
             within: NotNegative::literal(1e-6),
             without_pose: self.max_without_pose,
@@ -239,10 +173,12 @@ impl SequenceSource for Mcap {
     }
 
     fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
-        let camera = self.camera.as_ref().and_then(CameraChoice::file);
-        let others = [Some(self.file.as_path()), self.ground_truth.as_deref(), camera];
+        let further = self.cameras.values().map(|further| &further.camera);
+        let cameras = std::iter::once(&self.camera).chain(further);
+        let cameras = cameras.map(|camera| camera.as_ref().and_then(CameraChoice::file));
+        let others = [Some(self.file.as_path()), self.ground_truth.as_deref()].into_iter().chain(cameras);
         let rows = self.detections_file.iter().flat_map(DetectionsFile::files);
-        let files: Vec<_> = others.into_iter().chain(rows.map(Some)).collect();
+        let files: Vec<_> = others.chain(rows.map(Some)).collect();
         check_files(&folders.document, &files)
     }
 
@@ -259,7 +195,7 @@ impl Mcap {
         file: &Path,
         contents: &Contents,
         role: Role,
-        (setting, named): (&'static str, Option<&String>),
+        (setting, named): (&str, Option<&String>),
         instead: &'static str,
     ) -> Result<String, McapError> {
         let all = || {
@@ -285,41 +221,91 @@ impl Mcap {
                 Some(topic) if topic.role == Some(role) => messages.to_owned(),
                 Some(topic) => format!("has messages of {}, not of {}", topic.message_type, types()),
             };
-            return Err(McapError::WrongTopic { file, setting, topic: named.clone(), fault, topics: all() });
+            let (setting, topic) = (setting.to_owned(), named.clone());
+            return Err(McapError::WrongTopic { file, setting, topic, fault, topics: all() });
         }
         match contents.with_role(role)[..] {
             [] => Err(McapError::NoTopic { file, types: types(), instead, topics: all() }),
             [(only, _)] if is_of_transforms => {
-                let (topic, fault) = (only.to_owned(), messages.to_owned());
+                let (setting, topic, fault) = (setting.to_owned(), only.to_owned(), messages.to_owned());
                 Err(McapError::WrongTopic { file, setting, topic, fault, topics: all() })
             }
             [(only, _)] => Ok(only.to_owned()),
             ref several => {
                 let several: Vec<String> = several.iter().map(|(name, _)| format!("`{name}`")).collect();
-                Err(McapError::SeveralTopics { file, types: types(), setting, topics: several.join(", ") })
+                let (setting, topics) = (setting.to_owned(), several.join(", "));
+                Err(McapError::SeveralTopics { file, types: types(), setting, topics })
             }
         }
     }
 
-    /// Returns the camera of the boxes.
-    fn camera(
+    /// Returns a camera from the document, or from its calibration in the recording.
+    fn lens(
+        &self,
+        file: &Path,
+        choice: Option<&CameraChoice>,
+        calibration: Option<&Calibration>,
+        folders: &InputFolders,
+    ) -> Result<Rectification, SourceError> {
+        if let Some(choice) = choice {
+            return Rectification::new(choice, None, &folders.document);
+        }
+        let topic = calibration.map_or("camera_info", |calibration| &calibration.topic).to_owned();
+        let info = calibration.and_then(|calibration| calibration.info.as_ref());
+        let found = match info {
+            Some(info) => camera_of(info, self.rectified),
+            // `read` has made sure that there is a topic
+            None => Err("no message can be decoded".into()),
+        };
+        found.map_err(|fault| McapError::Camera { file: file.to_owned(), topic, fault }.into())
+    }
+
+    /// Returns the frame of the body.
+    fn body_frame<'a>(&'a self, file: &Path, messages: &'a RecordedMessages) -> Result<&'a str, McapError> {
+        let body = self.body_frame.as_deref().or(messages.body_frame.as_deref());
+        body.ok_or_else(|| McapError::NoFrame {
+            file: file.to_owned(),
+            topic: messages.odometry_topic.clone(),
+            what: "the frame that has the pose (`child_frame_id`)",
+            setting: "body_frame".into(),
+        })
+    }
+
+    /// Returns the pose of a further camera on the body.
+    fn further_pose(
         &self,
         file: &Path,
         messages: &RecordedMessages,
-        folders: &InputFolders,
-    ) -> Result<Rectification, SourceError> {
-        if let Some(choice) = &self.camera {
-            return Rectification::new(choice, None, &folders.document);
+        index: usize,
+        further: &FurtherMcapCamera,
+    ) -> Result<Se3, McapError> {
+        let no_transform = |source| McapError::NoTransform { file: file.to_owned(), source };
+        if let Some(pose) = further.body_from_camera {
+            return Ok(pose);
         }
-        let Some((topic, info)) = &messages.camera else {
-            // `read` has made sure that there is a topic; it has no message that can be decoded
-            let fault = "no message can be decoded".into();
-            return Err(
-                McapError::Camera { file: file.to_owned(), topic: "camera_info".into(), fault }.into()
-            );
+        let body = self.body_frame(file, messages)?;
+        let frame = further.camera_frame.clone().or_else(|| messages.frame_of(index));
+        let camera = frame.ok_or_else(|| McapError::NoFrame {
+            file: file.to_owned(),
+            topic: further.detections.clone(),
+            what: "the frame of the camera",
+            setting: "cameras".into(),
+        })?;
+        let moves = |camera: &str| -> Result<bool, McapError> {
+            Ok(camera != body && !messages.transforms.times(body, camera).map_err(no_transform)?.is_empty())
         };
-        let found = camera_of(info, self.rectified);
-        found.map_err(|fault| McapError::Camera { file: file.to_owned(), topic: topic.clone(), fault }.into())
+        let first = self.camera_frame.as_deref().or(messages.camera_frame.as_deref());
+        let first = first.filter(|_| self.body_from_camera.is_none()).unwrap_or(body);
+        for frame in [&camera, first] {
+            if moves(frame)? {
+                let [camera, body] = [frame, body].map(str::to_owned);
+                return Err(McapError::MovingCamera { file: file.to_owned(), camera, body });
+            }
+        }
+        if camera == body {
+            return Ok(Se3::identity());
+        }
+        messages.transforms.pose(body, &camera, 0.0).map_err(no_transform)
     }
 
     /// Returns the poses of the camera in the odometry frame, and the pose of the camera on the body if it is
@@ -329,25 +315,20 @@ impl Mcap {
         file: &Path,
         messages: &RecordedMessages,
     ) -> Result<(Vec<StampedPose>, Option<Se3>), McapError> {
-        let no_frame = |topic: &str, what, setting| McapError::NoFrame {
-            file: file.to_owned(),
-            topic: topic.to_owned(),
-            what,
-            setting,
-        };
         let no_transform = |source| McapError::NoTransform { file: file.to_owned(), source };
         let mut poses = messages.poses.clone();
         if let Some(pose) = self.body_from_camera {
             poses.iter_mut().for_each(|stamped| Extrinsics::new(pose).apply_to_pose(&mut stamped.pose));
             return Ok((poses, Some(pose)));
         }
-        let body = self.body_frame.as_deref().or(messages.body_frame.as_deref());
-        let body = body.ok_or_else(|| {
-            no_frame(&messages.odometry_topic, "the frame that has the pose (`child_frame_id`)", "body_frame")
-        })?;
+        let body = self.body_frame(file, messages)?;
         let camera = self.camera_frame.as_deref().or(messages.camera_frame.as_deref());
-        let camera = camera
-            .ok_or_else(|| no_frame(&messages.detections_topic, "the frame of the camera", "camera_frame"))?;
+        let camera = camera.ok_or_else(|| McapError::NoFrame {
+            file: file.to_owned(),
+            topic: messages.detections_topic.clone(),
+            what: "the frame of the camera",
+            setting: "camera_frame".into(),
+        })?;
         let transforms = &messages.transforms;
         if body == camera {
             return Ok((poses, None));
@@ -383,10 +364,11 @@ impl Mcap {
     fn detections(
         &self,
         boxes: &[BoxesOfImage],
-        camera: &Arc<MountedCamera>,
+        cameras: &Cameras,
     ) -> (Vec<f64>, Vec<(f64, Detection)>, Vec<UnusedInput>) {
         let (mut rows, mut unused) = (vec![], vec![]);
         for image in boxes {
+            let Some(camera) = cameras.iter().nth(image.camera) else { continue };
             for (place, seen) in image.boxes.iter().enumerate() {
                 match seen.clone().and_then(|(bounds, scores)| self.detection(bounds, scores, camera)) {
                     Ok(detection) => rows.push((image.timestamp, detection)),

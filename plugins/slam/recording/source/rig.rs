@@ -32,18 +32,31 @@ impl Rig {
         folder: &Path,
     ) -> Result<Self, SourceError> {
         for (name, camera, body_from_camera) in cameras {
-            let is_word = |c: char| c.is_alphanumeric() || ['_', '-'].contains(&c);
-            if name.is_empty() || !name.chars().all(is_word) {
-                return Err(SourceError::CameraName { name: name.clone() });
-            }
-            let lens = Rectification::new(camera, None, folder)?;
-            let first_from_camera = self
-                .body_from_first
-                .map_or(*body_from_camera, |first| first.inverse().compose(body_from_camera));
-            self.cameras.add(name, lens.camera, first_from_camera);
-            self.lenses.push(lens);
+            self.add(name, Rectification::new(camera, None, folder)?, *body_from_camera)?;
         }
         Ok(self)
+    }
+
+    /// Adds a camera at a pose on the body.
+    ///
+    /// # Errors
+    /// If the name is not a word.
+    pub(super) fn add(
+        &mut self,
+        name: &str,
+        lens: Rectification,
+        body_from_camera: Se3,
+    ) -> Result<(), SourceError> {
+        let is_word = |c: char| c.is_alphanumeric() || ['_', '-'].contains(&c);
+        if name.is_empty() || !name.chars().all(is_word) {
+            return Err(SourceError::CameraName { name: name.to_owned() });
+        }
+        let first_from_body = self.body_from_first.map(|first| first.inverse());
+        let first_from_camera =
+            first_from_body.map_or(body_from_camera, |first| first.compose(&body_from_camera));
+        self.cameras.add(name, lens.camera, first_from_camera);
+        self.lenses.push(lens);
+        Ok(())
     }
 
     /// Rectifies the boxes of a recording.

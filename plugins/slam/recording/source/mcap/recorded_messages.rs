@@ -1,5 +1,5 @@
 //! Messages of a recording that a sequence is made of.
-use super::{Mcap, McapError};
+use super::{CameraChoice, FurtherMcapCamera, Mcap, McapError};
 use manifactor_formats::tum::StampedPose;
 use manifactor_graph::Manifold;
 use manifactor_ros::messages::{CameraInfo, Detection2D, Detection2DArray, FramedPose, TransformList};
@@ -17,6 +17,9 @@ pub(super) type BoxOrFault = Result<([f64; 4], Vec<(String, f64)>), String>;
 pub(super) struct BoxesOfImage {
     /// Unit: seconds.
     pub timestamp: f64,
+    /// Index of the camera.
+    pub camera: usize,
+    topic: String,
     frame: String,
     pub boxes: Vec<BoxOrFault>,
 }
@@ -24,8 +27,16 @@ pub(super) struct BoxesOfImage {
 impl BoxesOfImage {
     #[cfg(test)]
     pub(super) fn new(timestamp: f64, boxes: Vec<BoxOrFault>) -> Self {
-        Self { timestamp, frame: String::new(), boxes }
+        Self { timestamp, camera: 0, topic: String::new(), frame: String::new(), boxes }
     }
+}
+
+/// Calibration of a camera in the recording.
+pub(super) struct Calibration {
+    /// Topic; empty if the document gives the camera.
+    pub topic: String,
+    /// `None` if no message can be decoded.
+    pub info: Option<CameraInfo>,
 }
 
 /// Messages that a sequence is made of.
@@ -40,8 +51,8 @@ pub(super) struct RecordedMessages {
     /// Frame of the camera, if the messages say it.
     pub camera_frame: Option<String>,
     pub boxes: Vec<BoxesOfImage>,
-    /// Calibration with its topic.
-    pub camera: Option<(String, CameraInfo)>,
+    /// Calibration of each camera.
+    pub calibrations: Vec<Calibration>,
     pub transforms: Transforms,
 }
 
@@ -77,11 +88,30 @@ impl RecordedMessages {
             .camera_frame
             .clone()
             .or_else(|| contents.topics.get(&detections).and_then(|topic| topic.frame.clone()));
-        let camera_info = match &source.camera {
-            Some(_) => None,
-            None => Some(Self::camera_topic(source, file, &contents, frame_of_boxes.as_deref())?),
-        };
-        let mut found = Self { odometry_topic: odometry, detections_topic: detections, ..Self::default() };
+        let topic_of =
+            |choice: Option<&CameraChoice>, setting: &str, named: Option<&String>, frame: Option<&str>| {
+                match choice {
+                    Some(_) => Ok(String::new()),
+                    None => Self::camera_topic(source, file, &contents, (setting, named), frame),
+                }
+            };
+        let named = source.camera_info.as_ref();
+        let mut topics =
+            vec![topic_of(source.camera.as_ref(), "camera_info", named, frame_of_boxes.as_deref())?];
+        for (name, further) in &source.cameras {
+            let setting = format!("cameras.{name}.detections");
+            let topic =
+                source.topic(file, &contents, Role::Detections, (&setting, Some(&further.detections)), "")?;
+            let of_topic = || contents.topics.get(&topic).and_then(|topic| topic.frame.as_deref());
+            let frame = further.camera_frame.as_deref().or_else(of_topic);
+            let setting = format!("cameras.{name}.camera_info");
+            topics.push(topic_of(further.camera.as_ref(), &setting, further.camera_info.as_ref(), frame)?);
+        }
+        let calibrations = topics.into_iter().map(|topic| Calibration { topic, info: None }).collect();
+        let further_topics: Vec<&str> =
+            source.cameras.values().map(|further| further.detections.as_str()).collect();
+        let mut found =
+            Self { odometry_topic: odometry, detections_topic: detections, calibrations, ..Self::default() };
         let mut unused = UnusedMessages::default();
         let ending = read(file, |message| {
             let name = &message.topic.name;
@@ -90,15 +120,10 @@ impl RecordedMessages {
                 found.add_transforms(&message)
             } else if *name == found.odometry_topic {
                 found.add_pose(&message)
-            } else if *name == found.detections_topic {
+            } else if *name == found.detections_topic || further_topics.contains(&name.as_str()) {
                 found.add_boxes(&message)
-            } else if Some(name) == camera_info.as_ref() && found.camera.is_none() {
-                message
-                    .decode()
-                    .map(|info| found.camera = Some((name.clone(), info)))
-                    .map_err(|error| text(&error))
             } else {
-                Ok(())
+                found.add_calibration(&message)
             };
             if let Err(fault) = done {
                 unused.add(name, &fault);
@@ -119,6 +144,7 @@ impl RecordedMessages {
         source: &Mcap,
         file: &Path,
         contents: &Contents,
+        (setting, named): (&str, Option<&String>),
         frame: Option<&str>,
     ) -> Result<String, McapError> {
         let candidates = contents.with_role(Role::CameraInfo).into_iter();
@@ -127,9 +153,9 @@ impl RecordedMessages {
             .map(|(name, _)| name)
             .collect();
         let only = of_frame.first().filter(|_| of_frame.len() == 1).map(|name| (*name).to_owned());
-        let named = source.camera_info.clone().or(only);
+        let named = named.cloned().or(only);
         let instead = "`source.camera` can give the camera";
-        source.topic(file, contents, Role::CameraInfo, ("camera_info", named.as_ref()), instead)
+        source.topic(file, contents, Role::CameraInfo, (setting, named.as_ref()), instead)
     }
 
     fn add_transforms(&mut self, message: &BagMessage<'_>) -> Result<(), String> {
@@ -153,12 +179,21 @@ impl RecordedMessages {
         Ok(())
     }
 
+    fn add_calibration(&mut self, message: &BagMessage<'_>) -> Result<(), String> {
+        let is_open = |own: &&mut Calibration| own.info.is_none() && own.topic == message.topic.name;
+        for own in self.calibrations.iter_mut().filter(is_open) {
+            own.info = Some(message.decode().map_err(|error| text(&error))?);
+        }
+        Ok(())
+    }
+
     fn add_boxes(&mut self, message: &BagMessage<'_>) -> Result<(), String> {
         let Detection2DArray { header, detections } = message.decode().map_err(|error| text(&error))?;
         let read = |seen: &Detection2D| Ok((seen.bounds()?, seen.scores()?));
         let boxes =
             detections.iter().map(|seen| read(seen).map_err(|fault: &str| fault.to_owned())).collect();
-        self.boxes.push(BoxesOfImage { timestamp: header.stamp.seconds(), frame: header.frame_id, boxes });
+        let (timestamp, topic) = (header.stamp.seconds(), message.topic.name.clone());
+        self.boxes.push(BoxesOfImage { timestamp, camera: 0, topic, frame: header.frame_id, boxes });
         Ok(())
     }
 
@@ -198,7 +233,9 @@ impl RecordedMessages {
             let why = unused.0.get(&self.odometry_topic).map(|(_, fault)| fault.as_str());
             return Err(no_poses(&self.odometry_topic, why));
         }
-        let cameras: BTreeSet<&str> = self.boxes.iter().map(|image| image.frame.as_str()).collect();
+        self.assign_cameras(source);
+        let of_first = || self.boxes.iter().filter(|image| image.camera == 0);
+        let cameras: BTreeSet<&str> = of_first().map(|image| image.frame.as_str()).collect();
         let wanted = source.camera_frame.as_deref();
         if cameras.len() > 1 && wanted.is_none_or(|wanted| !cameras.contains(wanted)) {
             let cameras: Vec<String> = cameras.iter().map(|name| format!("`{name}`")).collect();
@@ -210,14 +247,42 @@ impl RecordedMessages {
         }
         if cameras.len() > 1 {
             let count = self.boxes.len();
-            self.boxes.retain(|image| Some(image.frame.as_str()) == wanted);
+            self.boxes.retain(|image| image.camera > 0 || Some(image.frame.as_str()) == wanted);
             let others = count - self.boxes.len();
             tracing::warn!("{}: {others} images of other cameras are left out", file.display());
         }
-        let of_camera = self.camera.as_ref().map(|(_, info)| info.header.frame_id.clone());
-        let of_boxes = self.boxes.first().map(|image| image.frame.clone());
-        self.camera_frame = [of_camera, of_boxes].into_iter().flatten().find(|name| !name.is_empty());
+        self.camera_frame = self.frame_of(0);
         Ok(())
+    }
+
+    /// Assigns each image to the further camera with its topic and frame; the remaining ones are of the first camera.
+    fn assign_cameras(&mut self, source: &Mcap) {
+        for image in &mut self.boxes {
+            let shows = |further: &FurtherMcapCamera| {
+                let frame = further.camera_frame.as_deref().unwrap_or(&image.frame);
+                further.detections == image.topic && frame == image.frame
+            };
+            image.camera = source.cameras.values().position(shows).map_or(0, |place| place + 1);
+        }
+        // images of a further topic with another frame
+        let first = &self.detections_topic;
+        let count = self.boxes.len();
+        self.boxes.retain(|image| image.camera > 0 || image.topic == *first);
+        if self.boxes.len() < count {
+            tracing::warn!(
+                "{} images are left out: no camera has their topic and frame",
+                count - self.boxes.len()
+            );
+        }
+    }
+
+    /// Returns the frame of a camera, if the messages say it.
+    pub(super) fn frame_of(&self, camera: usize) -> Option<String> {
+        let info = self.calibrations.get(camera).and_then(|own| own.info.as_ref());
+        let of_info = info.map(|info| info.header.frame_id.clone());
+        let of_boxes =
+            self.boxes.iter().find(|image| image.camera == camera).map(|image| image.frame.clone());
+        [of_info, of_boxes].into_iter().flatten().find(|name| !name.is_empty())
     }
 }
 

@@ -41,8 +41,8 @@ fn classes_by_number_get_their_names_and_faulty_boxes_are_reported() {
         Err("no centre".to_owned()),
     ];
     let camera = camera_of(&info("plumb_bob", &[]), true).unwrap().camera;
-    let first = crate::camera::Cameras::new(camera).first().clone();
-    let (images, rows, unused) = source.detections(&[image(boxes), image(vec![])], &first);
+    let cameras = crate::camera::Cameras::new(camera);
+    let (images, rows, unused) = source.detections(&[image(boxes), image(vec![])], &cameras);
     assert_eq!((images.len(), rows.len(), unused.len()), (2, 1, 3));
     let classes: Vec<&str> = rows[0].1.scores.iter().map(|(class, _)| class).collect();
     assert_eq!(classes, ["cup", "7", "vase"]);
@@ -57,7 +57,9 @@ mod recordings {
 
     type Message = (&'static str, f64, Vec<u8>);
 
-    const TOPICS: [(&str, MessageType); 6] = [
+    const TOPICS: [(&str, MessageType); 8] = [
+        ("/rear/detections", DETECTIONS),
+        ("/rear/camera_info", CAMERA_INFO),
         ("/odom", ODOMETRY),
         ("/tf", TRANSFORMS),
         ("/tf_static", TRANSFORMS),
@@ -133,6 +135,60 @@ mod recordings {
         let seen = &found.detections[0];
         assert_eq!((seen.bounding_box.bounds(), seen.scores.best()), (CUP.0, Some(("cup", 0.8))));
         assert_eq!((found.cameras.first().model.fy, found.cameras.first().model.width), (510.0, 640));
+    }
+
+    /// A camera that looks back, with images at other times, on its own topics or on the topic of the first camera.
+    fn rear(topic: &'static str) -> Vec<Message> {
+        let distortion: (&str, &[f64]) = ("plumb_bob", &[0.0; 5]);
+        let info = camera_message("rear", [300.0, 300.0, 200.0, 150.0], [400, 300], distortion);
+        let mut all: Vec<Message> = vec![
+            ("/tf_static", 0.0, transform_message(0.0, "base_link", "rear", &looks_back())),
+            ("/rear/camera_info", 0.0, info),
+        ];
+        for i in 0..20 {
+            let t = 0.11 * f64::from(i) + 0.02;
+            all.push((topic, t, detections_message(100.0 + t, "rear", &[CUP])));
+        }
+        all
+    }
+
+    fn looks_back() -> Se3 {
+        let rotation = So3::from_quaternion_xyzw([-0.5, -0.5, 0.5, 0.5]).unwrap();
+        Se3::new(rotation, Vector3::new(-0.2, 0.0, 0.6))
+    }
+
+    #[test]
+    fn further_cameras_have_topics_or_frames_of_their_own() {
+        let own =
+            json!({"cameras": {"rear": {"detections": "/rear/detections"}}, "camera_info": "/camera_info"});
+        let shared = json!({"cameras": {"rear": {"detections": "/detections", "camera_frame": "rear"}},
+            "camera_frame": "camera", "detections": "/detections"});
+        for (settings, topic) in [(own, "/rear/detections"), (shared, "/detections")] {
+            let found = load(settings, messages().into_iter().chain(rear(topic))).unwrap();
+            let camera = found.cameras.named(Some("rear")).unwrap();
+            assert_eq!((camera.model.fx, camera.model.width), (300.0, 400));
+            let expected = mast().compose(&optical()).inverse().compose(&looks_back());
+            assert!(camera.first_from_camera.unwrap().local(&expected).norm() < 1e-12);
+            // all 20 images of this camera lie between two poses
+            let seen = found.detections.iter().filter(|detection| detection.camera.index == 1);
+            assert_eq!((found.frames.len(), seen.count()), (42, 20));
+        }
+    }
+
+    #[test]
+    fn a_further_camera_that_moves_or_has_no_topic_is_an_error() {
+        let rear_moves = (0..20).map(|i| {
+            let t = 0.1 * f64::from(i);
+            ("/tf", t, transform_message(100.0 + t, "base_link", "rear", &body(t)))
+        });
+        let still = rear("/rear/detections").into_iter().filter(|(name, ..)| *name != "/tf_static");
+        let settings =
+            |topic: &str| json!({"cameras": {"rear": {"detections": topic}}, "camera_info": "/camera_info"});
+        let moving = messages().into_iter().chain(still).chain(rear_moves);
+        let error = load(settings("/rear/detections"), moving).unwrap_err().to_string();
+        assert!(error.contains("the frame `rear` moves in `base_link`"), "{error}");
+        let error = load(settings("/left"), messages()).unwrap_err().to_string();
+        assert!(error.contains("`source.cameras.rear.detections` names `/left`"), "{error}");
     }
 
     #[test]
