@@ -56,17 +56,18 @@ fn largest_error(estimate: &Estimate) -> f64 {
 fn both_cameras_map_the_room_in_batch_and_stream() {
     let run = run_of(ROOM, &[]);
     let (online, batch, _) = both(&run, &run.variants[0], None);
-    println!("{:?}\n{:?}", online.counts, batch.counts);
     assert!(online.counts.objects >= 21 && batch.counts.objects >= 21);
     let mut sequence = sequence_of(&run);
     let (of_both, warnings) = estimate(&run, sequence.clone());
     assert!(warnings.iter().all(|warning| !warning.contains("turned")), "{warnings:?}");
-    sequence.detections.retain(|detection| detection.camera.index == 0);
-    let (of_one, _) = estimate(&run, sequence);
-    let [both, one] = [&of_both, &of_one].map(|estimate| estimate.landmarks().len());
-    println!("{both} {one} {} {}", largest_error(&of_both), largest_error(&of_one));
-    assert!(both >= 22 && one <= 16, "{both} {one}");
-    assert!(largest_error(&of_both) < 0.15, "{}", largest_error(&of_both));
+    // the poses are those of the first camera, the boxes of the second one
+    sequence.detections.retain(|detection| detection.camera.name == "rear");
+    let (of_rear, _) = estimate(&run, sequence);
+    for (estimate, objects) in [(of_both, 22), (of_rear, 12)] {
+        let (found, error) = (estimate.landmarks().len(), largest_error(&estimate));
+        println!("{found} objects, {error} m");
+        assert!(found >= objects && error < 0.2, "{found} {error}");
+    }
 }
 
 #[test]
@@ -74,8 +75,8 @@ fn association_knows_the_cameras() {
     let run = run_of(ROOM, &["association.type=likelihood"]);
     let (online, batch, _) = both(&run, &run.variants[0], None);
     for report in [online, batch] {
-        let association = report.association.unwrap();
-        println!("{association:?} {:?}", report.counts);
+        let scores = report.association.unwrap().in_the_end.unwrap();
+        assert!(scores.f1 > 0.99 && scores.objects == 24, "{scores:?}");
     }
 }
 

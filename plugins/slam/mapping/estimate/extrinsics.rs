@@ -22,7 +22,7 @@ pub struct ExtrinsicsError {
 /// Smallest rotation that is reported, in radians: 1°.
 const MIN_ROTATION: f64 = 0.017;
 /// Smallest gain that is reported, in nats. Errors of a detector persist over many frames and look like rotations.
-const MIN_GAIN: f64 = 20.0;
+const MIN_GAIN: f64 = 50.0;
 
 impl Estimate {
     /// Adds a warning for each further camera whose boxes contradict its pose on the body: the graph is solved again
