@@ -18,7 +18,7 @@ use manifactor::viz::run_page;
 use manifactor_cli::{Failure, write_experiment};
 use pyo3::prelude::*;
 use serde_json::json;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Cursor, Read};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -85,7 +85,7 @@ fn online(
     let done = detach(py, || {
         let mut run = Run::new(&document, data);
         if let Some(lines) = lines {
-            let lines = PythonLines { lines, pending: vec![], read: 0 };
+            let lines = PythonLines { lines, pending: Cursor::default() };
             run.read_frames_from("frames", Box::new(BufReader::new(lines)));
         }
         let mut frames = Frames { on_frame, objects: ObjectUpdates::default() };
@@ -120,30 +120,29 @@ fn report_of(
 /// Lines of a Python iterator. An exception ends them, and is raised after the run.
 struct PythonLines {
     lines: Py<PyAny>,
-    pending: Vec<u8>,
-    read: usize,
+    pending: Cursor<Vec<u8>>,
 }
 
 impl Read for PythonLines {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if self.read == self.pending.len() {
+        loop {
+            let read = self.pending.read(buffer)?;
+            if read > 0 {
+                return Ok(read);
+            }
             let next = Python::attach(|py| {
                 let next = self.lines.bind(py).try_iter()?.next();
                 next.transpose()?.map(|line| line.extract::<String>()).transpose()
             });
             match next {
                 Ok(None) => return Ok(0),
-                Ok(Some(line)) => (self.pending, self.read) = ((line + "\n").into_bytes(), 0),
+                Ok(Some(line)) => self.pending = Cursor::new((line + "\n").into_bytes()),
                 Err(error) => {
                     crate::raised::store_exception(error);
                     return Err(io::Error::other("the frames raised an exception"));
                 }
             }
         }
-        let mut rest = &self.pending[self.read..];
-        let read = rest.read(buffer)?;
-        self.read += read;
-        Ok(read)
     }
 }
 

@@ -221,19 +221,19 @@ impl Mcap {
                 Some(topic) if topic.role == Some(role) => messages.to_owned(),
                 Some(topic) => format!("has messages of {}, not of {}", topic.message_type, types()),
             };
-            let (setting, topic) = (setting.to_owned(), named.clone());
+            let (setting, topic) = (setting.into(), named.clone());
             return Err(McapError::WrongTopic { file, setting, topic, fault, topics: all() });
         }
         match contents.with_role(role)[..] {
             [] => Err(McapError::NoTopic { file, types: types(), instead, topics: all() }),
             [(only, _)] if is_of_transforms => {
-                let (setting, topic, fault) = (setting.to_owned(), only.to_owned(), messages.to_owned());
+                let (setting, topic, fault) = (setting.into(), only.to_owned(), messages.to_owned());
                 Err(McapError::WrongTopic { file, setting, topic, fault, topics: all() })
             }
             [(only, _)] => Ok(only.to_owned()),
             ref several => {
                 let several: Vec<String> = several.iter().map(|(name, _)| format!("`{name}`")).collect();
-                let (setting, topics) = (setting.to_owned(), several.join(", "));
+                let (setting, topics) = (setting.into(), several.join(", "));
                 Err(McapError::SeveralTopics { file, types: types(), setting, topics })
             }
         }

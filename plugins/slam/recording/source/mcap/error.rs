@@ -28,7 +28,7 @@ pub enum McapError {
         /// The types.
         types: String,
         /// The setting.
-        setting: String,
+        setting: Box<str>,
         /// The topics.
         topics: String,
     },
@@ -38,7 +38,7 @@ pub enum McapError {
         /// The recording.
         file: PathBuf,
         /// The setting.
-        setting: String,
+        setting: Box<str>,
         /// The topic.
         topic: String,
         /// The fault.
@@ -56,7 +56,7 @@ pub enum McapError {
         /// The frame.
         what: &'static str,
         /// The setting.
-        setting: String,
+        setting: Box<str>,
     },
     /// The boxes come from several cameras.
     #[error("{}: the boxes of `{topic}` come from several cameras, {cameras}: set `source.camera_frame` to one of them", file.display())]
