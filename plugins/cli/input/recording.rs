@@ -2,7 +2,8 @@
 use crate::failure::Failure;
 use crate::output;
 use manifactor::config::{Document, Format};
-use manifactor::slam::ros::{Contents, Role};
+use manifactor::slam::ros::{Contents, Role, TopicContents};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -37,10 +38,14 @@ pub(crate) fn guess(contents: &Contents, file: &Path) -> GuessedSource {
         missing: vec![],
         is_level: false,
     };
+    let mut camera_frame = None;
     for (role, setting, instead) in ROLES {
         let topics = contents.with_role(role);
         // a recording often has several poses: the one with most messages has the highest rate
-        let Some((name, topic)) = topics.into_iter().max_by_key(|(_, topic)| topic.messages) else {
+        let most = topics.iter().copied().max_by_key(|(_, topic)| topic.messages);
+        // a calibration is that of the camera of the boxes
+        let of_boxes = camera_frame.and_then(|frame| calibration(contents, frame));
+        let Some((name, topic)) = of_boxes.filter(|_| role == Role::CameraInfo).or(most) else {
             guessed
                 .missing
                 .push(format!("no topic has messages of {}; {instead}", role.types().join(" or ")));
@@ -48,13 +53,42 @@ pub(crate) fn guess(contents: &Contents, file: &Path) -> GuessedSource {
         };
         let _ = write!(guessed.source, ", {setting} = {name:?}");
         let frame = topic.frame.as_deref().unwrap_or_default();
+        if role == Role::Detections {
+            camera_frame = topic.frame.as_deref();
+        }
         guessed.is_level |= role == Role::Odometry && LEVEL_FRAMES.contains(&frame.trim_start_matches('/'));
+    }
+    if let Some(first) = camera_frame {
+        guessed.source += &further_cameras(contents, first);
     }
     if guessed.is_level {
         guessed.source += ", up = [0.0, 0.0, 1.0]";
     }
     guessed.source = format!("source = {{ {} }}", guessed.source);
     guessed
+}
+
+/// Returns the topic with the calibration of the camera with this frame.
+fn calibration<'a>(contents: &'a Contents, frame: &str) -> Option<(&'a str, &'a TopicContents)> {
+    let mut all = contents.with_role(Role::CameraInfo).into_iter();
+    all.find(|(_, topic)| topic.frame.as_deref() == Some(frame))
+}
+
+/// Returns the setting for further cameras: topics of boxes in another frame than `first` that has a calibration.
+fn further_cameras(contents: &Contents, first: &str) -> String {
+    let mut cameras = BTreeMap::new();
+    for (boxes, topic) in contents.with_role(Role::Detections) {
+        let Some(frame) = topic.frame.as_deref().filter(|frame| *frame != first) else { continue };
+        let Some((info, _)) = calibration(contents, frame) else { continue };
+        let is_word = |c: char| c.is_alphanumeric() || ['_', '-'].contains(&c);
+        let name: String = frame.chars().map(|c| if is_word(c) { c } else { '_' }).collect();
+        let settings = format!("{name} = {{ detections = {boxes:?}, camera_info = {info:?} }}");
+        cameras.entry(frame).or_insert(settings);
+    }
+    match cameras.is_empty() {
+        true => String::new(),
+        false => format!(", cameras = {{ {} }}", cameras.into_values().collect::<Vec<_>>().join(", ")),
+    }
 }
 
 /// Returns the document of a run of a recording, and prints the guesses.

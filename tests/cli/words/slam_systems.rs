@@ -54,34 +54,54 @@ fn frames() -> Vec<Value> {
 
 /// Writes frames as a robot records them: odometry of its base, and the boxes of a camera on it.
 fn drive(frames: &[Value], base_from_camera: &Se3) -> Vec<u8> {
+    drive_with(frames, base_from_camera, None)
+}
+
+/// Writes frames with a second camera, at a pose on the base.
+fn drive_with(frames: &[Value], base_from_camera: &Se3, base_from_rear: Option<&Se3>) -> Vec<u8> {
     let camera_from_base = base_from_camera.inverse();
-    let info = camera_message("camera", [320.0, 320.0, 320.0, 240.0], [640, 480], ("plumb_bob", &[0.0; 5]));
+    let info =
+        |frame| camera_message(frame, [320.0, 320.0, 320.0, 240.0], [640, 480], ("plumb_bob", &[0.0; 5]));
     let start = [
         ("/tf_static", 0.0, transform_message(0.0, "base_link", "camera", base_from_camera)),
-        ("/camera_info", 0.0, info),
+        ("/camera_info", 0.0, info("camera")),
     ];
+    let rear = base_from_rear.into_iter().flat_map(|pose| {
+        let transform = transform_message(0.0, "base_link", "rear_camera", pose);
+        [("/tf_static", 0.0, transform), ("/rear/camera_info", 0.0, info("rear_camera"))]
+    });
     let messages = frames.iter().flat_map(|frame| {
         let time = frame["timestamp"].as_f64().unwrap();
         let pose: Se3 = serde_json::from_value(frame["pose"].clone()).unwrap();
-        let seen = frame["boxes"].as_array().unwrap().iter().map(|seen| {
-            let sides: [f64; 4] = serde_json::from_value(seen["box"].clone()).unwrap();
-            (
-                sides,
-                seen["class"].as_str().unwrap(),
-                seen.get("score").map_or(1.0, |score| score.as_f64().unwrap()),
-            )
-        });
-        let boxes = detections_message(time, "camera", &seen.collect::<Vec<_>>());
+        let seen = |name: Option<&str>| {
+            let own = frame["boxes"].as_array().unwrap().iter();
+            let own = own.filter(|seen| seen.get("camera").and_then(Value::as_str) == name);
+            own.map(|seen| {
+                let sides: [f64; 4] = serde_json::from_value(seen["box"].clone()).unwrap();
+                (
+                    sides,
+                    seen["class"].as_str().unwrap(),
+                    seen.get("score").map_or(1.0, |score| score.as_f64().unwrap()),
+                )
+            })
+            .collect::<Vec<_>>()
+        };
+        let boxes = detections_message(time, "camera", &seen(None));
+        let of_rear = base_from_rear.map(|_| detections_message(time, "rear_camera", &seen(Some("rear"))));
         let odometry = odometry_message(time, "odom", "base_link", &pose.compose(&camera_from_base));
-        [("/odom", time, odometry), ("/detections", time, boxes)]
+        let rear = of_rear.map(|boxes| ("/rear/detections", time, boxes));
+        [("/odom", time, odometry), ("/detections", time, boxes)].into_iter().chain(rear)
     });
     let topics = [
         ("/odom", ODOMETRY),
         ("/detections", DETECTIONS),
         ("/camera_info", CAMERA_INFO),
         ("/tf_static", TRANSFORMS),
+        ("/rear/detections", DETECTIONS),
+        ("/rear/camera_info", CAMERA_INFO),
     ];
-    recording(&topics, start.into_iter().chain(messages))
+    let topics = if base_from_rear.is_some() { &topics[..] } else { &topics[..4] };
+    recording(topics, start.into_iter().chain(rear).chain(messages))
 }
 
 /// Pose of a camera that looks ahead.
@@ -186,4 +206,50 @@ fn a_jump_of_the_odometry_is_corrected() {
         let objects = variant["counts"]["objects"].as_u64().unwrap();
         assert!((12..=20).contains(&objects), "{command}: {objects} objects");
     }
+}
+
+/// Pose of a second camera in the frame of the first one, turned by 30°.
+const REAR: &str =
+    "{ translation = [0.1, 0.0, 0.0], rotation = [0.0, 0.25881904510252074, 0.0, 0.9659258262890683] }";
+
+#[test]
+fn cameras_of_a_recording_give_the_map_of_their_lines() {
+    let camera = CAMERA.trim_start_matches("camera = ");
+    let further = format!("{{ rear = {{ camera = {camera}, body_from_camera = {REAR} }} }}");
+    let simulated =
+        format!("source = {{ type = \"simulated\", trajectory = {{ frames = 80 }}, cameras = {further} }}");
+    let settings = "association = { type = \"likelihood\" }\nvariance_components = {}\nsemantics = \"resting\"\n\
+                    detections = { loss = { type = \"cauchy\", scale = 2.8 } }\n";
+    let from_lines = format!(
+        "source = {{ type = \"json_lines\", file = \"f.jsonl\", up = [0, 0, 1], {CAMERA}, cameras = {further} }}"
+    );
+    let folder = folder(&[("sim.toml", &simulated), ("lines.toml", &format!("{settings}{from_lines}"))]);
+    let lines = manifactor(&format!("simulate {} --lines", path(&folder, "sim.toml"))).ended(0).stdout;
+    let mut frames: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let boxes = frames.iter_mut().flat_map(|frame| frame["boxes"].as_array_mut().unwrap());
+    let removed = boxes.filter_map(|seen| {
+        seen.as_object_mut().unwrap().remove("object");
+        seen.get("camera").cloned()
+    });
+    assert!(removed.count() > 100);
+    std::fs::write(path(&folder, "f.jsonl"), frames.iter().map(|f| format!("{f}\n")).collect::<String>())
+        .unwrap();
+    let second: Se3 = serde_json::from_value(serde_json::json!({
+        "translation": [0.1, 0.0, 0.0], "rotation": [0.0, 0.258_819_045_102_520_74, 0.0, 0.965_925_826_289_068_3]
+    }))
+    .unwrap();
+    let bag = path(&folder, "two.mcap");
+    let base_from_rear = base_from_camera().compose(&second);
+    std::fs::write(&bag, drive_with(&frames, &base_from_camera(), Some(&base_from_rear))).unwrap();
+
+    let ran = manifactor(&format!("map {bag} --out {} --json", path(&folder, "two"))).ended(0);
+    let cameras = "cameras = { rear_camera = { detections = \"/rear/detections\", camera_info = \"/rear/camera_info\" } }";
+    assert!(ran.stderr.contains(cameras), "{}", ran.stderr);
+    let document = path(&folder, "lines.toml");
+    let expected = manifactor(&format!("run {document} --out {} --json", path(&folder, "lines"))).ended(0);
+    let counts = |report: &Value| report["variants"][0]["counts"].clone();
+    let (found, expected) = (counts(&ran.json()), counts(&expected.json()));
+    assert_eq!(found["detections"], expected["detections"]);
+    assert_eq!(found["objects"], expected["objects"]);
+    assert!(found["objects"].as_u64().unwrap() >= 12, "{found}");
 }
