@@ -46,6 +46,32 @@ fn the_schema_accepts_every_example_and_refuses_a_misspelt_one() {
 }
 
 #[test]
+fn the_schema_of_a_frame_accepts_lines_and_refuses_a_misspelt_one() {
+    let frame = validator("frame");
+    let read = |line: &str| serde_json::from_str::<Value>(line).unwrap();
+    let camera = "camera = { fx = 320, fy = 320, cx = 320, cy = 240, width = 640, height = 480 }";
+    let further = format!(
+        "source.cameras.rear={{ {camera}, body_from_camera = {{ translation = [0, 0, 0], rotation = [0, 1, 0, 0] }} }}"
+    );
+    let simulate = ["simulate", "examples/desk/desk.toml", "--lines", "--set"];
+    let more =
+        ["source.detector.depth_error=0.02", "--set", &further, "--set", "source.trajectory.frames=20"];
+    let lines = crate::run(simulate.into_iter().chain(more), &[]).ended(0).stdout;
+    let closure = r#"{"timestamp": 4, "pose": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}, "odometry_noise": {"sigma": 0.1},
+        "factors": [{"id": "loop", "keys": [1.0, 4], "factor": {"type": "between_se3", "relative": {"translation": [0, 0, 0],
+        "rotation": [0, 0, 0, 1]}}, "noise": {"sigma": 0.1}}], "removed": ["a"],
+        "corrected": [{"timestamp": 1, "pose": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}]}"#;
+    for line in lines.lines().map(read).chain([read(closure)]) {
+        assert_eq!(complaints(&frame, &line), [""; 0], "{line}");
+    }
+    let seen = |field: &str| {
+        read(&format!(r#"{{"timestamp": 1, "boxes": [{{"box": [1, 2, 3, 4], "{field}": 2.0}}]}}"#))
+    };
+    assert!(frame.is_valid(&seen("depth")) && !frame.is_valid(&seen("dept")));
+    assert!(!frame.is_valid(&read(r#"{"timestamp": 1, "pse": null}"#)));
+}
+
+#[test]
 fn every_registered_type_is_in_the_schema_and_its_example_fits() {
     let schema = manifactor("schema").ended(0).json();
     let definitions = &schema["$defs"];
