@@ -288,14 +288,15 @@ fn image_warning(sequence: &Sequence, camera: &MountedCamera) -> Option<Warning>
     let is_share = |side: f64| (-NORMALIZED_MARGIN..=1.0 + NORMALIZED_MARGIN).contains(&side);
     let is_normalized = |b: &BoundingBox| [b.xmin, b.ymin, b.xmax, b.ymax].into_iter().all(is_share);
     if boxes > 0 && all().all(is_normalized) {
-        return Some(Warning::NormalizedBoxes { boxes, image: [width, height] });
+        return Some(Warning::NormalizedBoxes { boxes, setting: camera.setting(), image: [width, height] });
     }
     let is_outside = |b: &&BoundingBox| {
         b.xmax <= 0.0 || b.ymax <= 0.0 || b.xmin >= f64::from(width) || b.ymin >= f64::from(height)
     };
     let outside = all().filter(is_outside).count();
     let is_too_many = outside as f64 > MAX_OUTSIDE_SHARE * boxes as f64;
-    is_too_many.then_some(Warning::OutsideImage { outside, boxes, image: [width, height] })
+    let (setting, image) = (camera.setting(), [width, height]);
+    is_too_many.then_some(Warning::OutsideImage { outside, boxes, setting, image })
 }
 
 /// Returns warnings about unused input, one per reason.

@@ -18,6 +18,14 @@ pub struct MountedCamera {
 }
 
 impl MountedCamera {
+    /// Returns the setting of the camera in a run document.
+    pub fn setting(&self) -> String {
+        match self.index {
+            0 => "source.camera".to_owned(),
+            _ => format!("source.cameras.{}.camera", self.name),
+        }
+    }
+
     /// Returns the pose of this camera from the pose of the first one.
     pub fn pose(&self, world_from_first: &Se3) -> Se3 {
         self.first_from_camera.map_or(*world_from_first, |pose| world_from_first.compose(&pose))
@@ -35,6 +43,14 @@ impl MountedCamera {
     }
 }
 
+/// Error for the name of a further camera that cannot be part of a file's name.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("`source.cameras` has the name {name:?}: expected letters, digits, `_` and `-`")]
+pub struct CameraNameError {
+    /// The name.
+    pub name: String,
+}
+
 /// All cameras of a sequence, at fixed poses on one body. The poses of frames are those of the first camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cameras {
@@ -50,10 +66,18 @@ impl Cameras {
     }
 
     /// Adds a camera at a pose in the frame of the first one.
-    pub fn add(&mut self, name: impl Into<String>, model: Camera, first_from_camera: Se3) {
-        let (name, index) = (name.into(), self.others.len() + 1);
+    ///
+    /// # Errors
+    /// If the name cannot be part of a file's name.
+    pub fn add(&mut self, name: &str, model: Camera, first_from_camera: Se3) -> Result<(), CameraNameError> {
+        let is_word = |c: char| c.is_alphanumeric() || ['_', '-'].contains(&c);
+        if name.is_empty() || !name.chars().all(is_word) {
+            return Err(CameraNameError { name: name.to_owned() });
+        }
+        let (name, index) = (name.to_owned(), self.others.len() + 1);
         let camera = MountedCamera { name, index, model, first_from_camera: Some(first_from_camera) };
         self.others.push(Arc::new(camera));
+        Ok(())
     }
 
     /// Returns the first camera.

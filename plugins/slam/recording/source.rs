@@ -1,4 +1,5 @@
 //! Sources of sequences, selected by type in a run's `[source]`.
+use crate::camera::CameraNameError;
 use crate::sequence::{ObjectId, Sequence};
 use manifactor_config::Diagnostics;
 use manifactor_formats::FormatError;
@@ -257,12 +258,9 @@ pub enum SourceError {
         /// Sides xmin, ymin, xmax, ymax. Unit: pixels.
         bounds: [f64; 4],
     },
-    /// A further camera whose name cannot be part of a file's name.
-    #[error("`source.cameras` has the name {name:?}: expected letters, digits, `_` and `-`")]
-    CameraName {
-        /// The name.
-        name: String,
-    },
+    /// A further camera whose name cannot be used.
+    #[error(transparent)]
+    CameraName(#[from] CameraNameError),
     /// A camera model together with a separate distortion.
     #[error(
         "`source.camera` is a model of its lens and `source.distortion` is another: leave one of them out"

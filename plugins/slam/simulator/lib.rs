@@ -6,7 +6,7 @@ use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::Camera;
-use manifactor_recording::camera::Cameras;
+use manifactor_recording::camera::{CameraNameError, Cameras};
 use manifactor_recording::sequence::{Acceleration, Frame, GroundTruth, Sequence};
 use manifactor_recording::source::{InputFolders, SequenceSource, SourceError};
 use rand::{Rng, SeedableRng};
@@ -107,6 +107,9 @@ pub enum SimulationError {
         /// Known classes.
         known: Vec<&'static str>,
     },
+    /// A further camera whose name cannot be used.
+    #[error(transparent)]
+    CameraName(#[from] CameraNameError),
     /// Too many objects for the rectangle.
     #[error(
         "there is no room for object {object} of the scene: make `scene.area` larger, or `scene.objects`, `scene.moved` or `scene.gap` less"
@@ -153,7 +156,7 @@ impl SimulatedSource {
         let after = DetectorErrors::draw(count, &mut noise);
         let mut cameras = Cameras::new(self.camera);
         for (name, further) in &self.cameras {
-            cameras.add(name, further.camera, further.body_from_camera);
+            cameras.add(name, further.camera, further.body_from_camera)?;
         }
         let mut detections = self.detect(&scene, cameras.first(), &poses, [before, after], &mut imagination);
         for camera in cameras.iter().skip(1) {

@@ -54,6 +54,15 @@ fn a_written_recording_is_read_back() {
 }
 
 #[test]
+fn a_name_that_leads_out_of_the_folder_is_refused() {
+    let mut settings = two_cameras(2);
+    let back = settings.cameras["back"];
+    settings.cameras.insert("../back".into(), back);
+    let error = settings.simulate().unwrap_err().to_string();
+    assert!(error.contains("`source.cameras` has the name \"../back\""), "{error}");
+}
+
+#[test]
 fn frames_written_as_lines_are_read_back() {
     let settings = two_cameras(20);
     let sequence = settings.simulate().unwrap();

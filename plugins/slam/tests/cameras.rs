@@ -88,7 +88,8 @@ fn a_wrong_pose_of_a_camera_is_reported() {
     let turn = So3::exp(&Vector3::new(0.0, 5_f64.to_radians(), 0.0));
     let given = rear.first_from_camera.unwrap();
     let mut cameras = Cameras::new(sequence.cameras.first().model);
-    cameras.add("rear", rear.model, Se3::new(given.rotation.compose(&turn), given.translation));
+    let turned = Se3::new(given.rotation.compose(&turn), given.translation);
+    cameras.add("rear", rear.model, turned).unwrap();
     let wrong = |detection: Detection| {
         let name = Some(detection.camera.name.as_str()).filter(|name| !name.is_empty());
         Detection { camera: cameras.named(name).unwrap().clone(), ..detection.clone() }

@@ -65,6 +65,9 @@ impl Estimate {
         let fixed = solve(&graph, &values, &*settings.solver, observer)?;
         let free = solve(&free, &fixed.values, &*settings.solver, observer)?;
         let Ok(found) = free.values.get::<Se3>(key.as_str()) else { return Ok(None) };
+        if [&fixed, &free].iter().any(|solved| solved.outcome.termination == Termination::Interrupted) {
+            return Ok(None);
+        }
         let rotation = given.local(found).fixed_rows::<3>(0).norm();
         let gain = fixed.outcome.final_cost - free.outcome.final_cost;
         let degrees = rotation.to_degrees();

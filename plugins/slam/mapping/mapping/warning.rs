@@ -49,15 +49,19 @@ pub enum Warning {
     OutsideImage {
         /// Number of such boxes.
         outside: usize,
-        /// Number of all boxes.
+        /// Number of all boxes of the camera.
         boxes: usize,
+        /// Setting of the camera.
+        setting: String,
         /// Width and height of the image. Unit: pixels.
         image: [u32; 2],
     },
     /// Boxes that all lie between 0 and 1: shares of the image instead of pixels.
     NormalizedBoxes {
-        /// Number of boxes.
+        /// Number of boxes of the camera.
         boxes: usize,
+        /// Setting of the camera.
+        setting: String,
         /// Width and height of the image. Unit: pixels.
         image: [u32; 2],
     },
@@ -193,14 +197,14 @@ impl fmt::Display for Warning {
             Self::TooManyUnused { what, allowed } => {
                 write!(f, "{what}; `source.max_without_pose` allows a share of {allowed}")
             }
-            Self::OutsideImage { outside, boxes, image: [width, height] } => write!(
+            Self::OutsideImage { outside, boxes, setting, image: [width, height] } => write!(
                 f,
                 "{outside} of {boxes} boxes lie outside of the image of {width} × {height} pixels and are left out: \
-                 compare `source.camera.width` and `source.camera.height` with the images of the detector"
+                 compare `{setting}.width` and `{setting}.height` with the images of the detector"
             ),
-            Self::NormalizedBoxes { boxes, image: [width, height] } => write!(
+            Self::NormalizedBoxes { boxes, setting, image: [width, height] } => write!(
                 f,
-                "all {boxes} boxes lie between 0 and 1, where pixels are expected: multiply x by the width, {width}, \
+                "all {boxes} boxes of `{setting}` lie between 0 and 1, where pixels are expected: multiply x by the width, {width}, \
                  and y by the height, {height}"
             ),
             Self::NotMapped { what, remedy } => write!(f, "not mapped: {what}; {remedy}"),

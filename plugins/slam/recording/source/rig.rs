@@ -40,21 +40,17 @@ impl Rig {
     /// Adds a camera at a pose on the body.
     ///
     /// # Errors
-    /// If the name is not a word.
+    /// If the name cannot be part of a file's name.
     pub(super) fn add(
         &mut self,
         name: &str,
         lens: Rectification,
         body_from_camera: Se3,
     ) -> Result<(), SourceError> {
-        let is_word = |c: char| c.is_alphanumeric() || ['_', '-'].contains(&c);
-        if name.is_empty() || !name.chars().all(is_word) {
-            return Err(SourceError::CameraName { name: name.to_owned() });
-        }
         let first_from_body = self.body_from_first.map(|first| first.inverse());
         let first_from_camera =
             first_from_body.map_or(body_from_camera, |first| first.compose(&body_from_camera));
-        self.cameras.add(name, lens.camera, first_from_camera);
+        self.cameras.add(name, lens.camera, first_from_camera)?;
         self.lenses.push(lens);
         Ok(())
     }

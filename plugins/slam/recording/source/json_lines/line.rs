@@ -313,7 +313,7 @@ mod tests {
     fn cameras() -> Cameras {
         let model = Camera::new([500.0, 500.0, 320.0, 240.0], 640, 480).unwrap();
         let mut cameras = Cameras::new(model);
-        cameras.add("left", model, Se3::identity());
+        cameras.add("left", model, Se3::identity()).unwrap();
         cameras
     }
 
