@@ -3,6 +3,7 @@ use crate::failure::Failure;
 use crate::output;
 use manifactor::config::{Document, Format};
 use manifactor::slam::ros::{Contents, Role, TopicContents};
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -42,7 +43,7 @@ pub(crate) fn guess(contents: &Contents, file: &Path) -> GuessedSource {
     for (role, setting, instead) in ROLES {
         let topics = contents.with_role(role);
         // a recording often has several poses: the one with most messages has the highest rate
-        let most = topics.iter().copied().max_by_key(|(_, topic)| topic.messages);
+        let most = topics.iter().copied().max_by_key(|(name, topic)| (topic.messages, Reverse(*name)));
         // a calibration is that of the camera of the boxes
         let of_boxes = camera_frame.and_then(|frame| calibration(contents, frame));
         let Some((name, topic)) = of_boxes.filter(|_| role == Role::CameraInfo).or(most) else {

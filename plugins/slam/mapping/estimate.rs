@@ -10,7 +10,6 @@ use crate::estimate::variance::{MotionChoice, VarianceComponents, VarianceError,
 use crate::mapping::{MappedObject, Mapping, MappingError, pose_key};
 use crate::settings::{DetectionSettings, RunSettings};
 pub use completion::CompletionOutcome;
-pub use extrinsics::ExtrinsicsError;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Values};

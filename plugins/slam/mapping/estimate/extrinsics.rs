@@ -8,17 +8,6 @@ use manifactor_recording::camera::MountedCamera;
 use manifactor_solve::{Observer, Termination, solve};
 use std::sync::Arc;
 
-/// The pose of a camera on the body that fits its boxes better.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ExtrinsicsError {
-    /// Name of the camera.
-    pub camera: String,
-    /// Angle between the given and the better rotation. Unit: radians.
-    pub rotation: f64,
-    /// Gain in log-likelihood.
-    pub gain: f64,
-}
-
 /// Smallest rotation that is reported, in radians: 1°.
 const MIN_ROTATION: f64 = 0.017;
 /// Smallest gain that is reported, in nats. Errors of a detector persist over many frames and look like rotations.
@@ -41,19 +30,24 @@ impl Estimate {
                 break;
             }
             let found = self.fit_extrinsics(camera, settings, observer)?;
-            let is_wrong = |found: &ExtrinsicsError| found.rotation > MIN_ROTATION && found.gain > MIN_GAIN;
-            self.mapping.warnings.extend(found.filter(is_wrong).map(Warning::Extrinsics));
+            if let Some((rotation, gain)) =
+                found.filter(|(rotation, gain)| *rotation > MIN_ROTATION && *gain > MIN_GAIN)
+            {
+                let camera = camera.name.clone();
+                self.mapping.warnings.push(Warning::Extrinsics { camera, rotation, gain });
+            }
         }
         Ok(self)
     }
 
-    /// Returns the difference between the given and the estimated pose of a camera on the body.
+    /// Returns the angle between the given and the estimated rotation of a camera on the body, in radians, and the gain in
+    /// log-likelihood.
     fn fit_extrinsics(
         &self,
         camera: &MountedCamera,
         settings: &RunSettings,
         observer: &mut dyn Observer,
-    ) -> Result<Option<ExtrinsicsError>, EstimateError> {
+    ) -> Result<Option<(f64, f64)>, EstimateError> {
         let Some(given) = camera.first_from_camera.map(|pose| pose.inverse()) else { return Ok(None) };
         let key = Key::from(format!("extrinsics of {}", camera.name));
         let Ok(mut graph) = with_free_extrinsics(&self.mapping.graph, &given, &key) else { return Ok(None) };
@@ -72,7 +66,7 @@ impl Estimate {
         let gain = fixed.outcome.final_cost - free.outcome.final_cost;
         let degrees = rotation.to_degrees();
         tracing::info!(camera = camera.name, "its boxes turn it by {degrees:.2}°, gain {gain:.1}");
-        Ok(Some(ExtrinsicsError { camera: camera.name.clone(), rotation, gain }))
+        Ok(Some((rotation, gain)))
     }
 }
 

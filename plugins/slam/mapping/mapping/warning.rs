@@ -1,4 +1,3 @@
-use crate::estimate::ExtrinsicsError;
 use manifactor_config::{nearest, quoted_list};
 use manifactor_recording::journal::LostFrames;
 use manifactor_recording::sequence::jumps::OdometryJump;
@@ -99,7 +98,14 @@ pub enum Warning {
         boxes: usize,
     },
     /// The boxes of a further camera contradict its pose on the body.
-    Extrinsics(ExtrinsicsError),
+    Extrinsics {
+        /// Name of the camera.
+        camera: String,
+        /// Angle between the given and the better rotation. Unit: radians.
+        rotation: f64,
+        /// Gain in log-likelihood.
+        gain: f64,
+    },
     /// The map has no objects.
     NoObjects {
         /// Number of detected objects.
@@ -237,7 +243,7 @@ impl fmt::Display for Warning {
                  after a jump of the odometry; a robust `odometry.loss` reduces the weight of jumps, for example \
                  {{ type = \"geman_mcclure\", scale = 5.0 }}"
             ),
-            Self::Extrinsics(ExtrinsicsError { camera, rotation, gain }) => write!(
+            Self::Extrinsics { camera, rotation, gain } => write!(
                 f,
                 "the boxes of the camera `{camera}` fit better if it is turned by {:.1}° (gain in log-likelihood: \
                  {gain:.0}): check `source.cameras.{camera}.body_from_camera`",

@@ -80,8 +80,13 @@ impl RecordedMessages {
             Some(rows) => rows.path(Path::new("")).display().to_string(),
             None => {
                 let instead = "`source.detections_file` can name a CSV file of boxes";
-                let named = ("detections", source.detections.as_ref());
-                source.topic(file, &contents, Role::Detections, named, instead)?
+                let is_free =
+                    |name: &&str| source.cameras.values().all(|further| further.detections != **name);
+                let free = contents.with_role(Role::Detections).into_iter().map(|(name, _)| name);
+                let free: Vec<&str> = free.filter(is_free).collect();
+                let only = free.first().filter(|_| free.len() == 1).map(|name| (*name).to_owned());
+                let named = source.detections.clone().or(only);
+                source.topic(file, &contents, Role::Detections, ("detections", named.as_ref()), instead)?
             }
         };
         let frame_of_boxes = source
