@@ -835,13 +835,14 @@ def max_mixture(*, components: Sequence[types.Component]) -> Factor:
 def on_body(
     *,
     factor: Factor,
-    body_from_camera: variables.Se3 | Fields,
+    body_from_camera: types.Se3 | None = None,
     poses: Numbers | None = None,
 ) -> Factor:
     """A factor on the pose of a body, if the variable is the pose of a camera mounted on it.
 
     The factor gets world_from_body = world_from_camera · body_from_camera⁻¹. An example is a position from a
-    satellite receiver, or a loop closure between poses of a robot. Rows and noise are those of `factor`.
+    satellite receiver, a loop closure between poses of a robot, or a box in the image of a second camera, which is then
+    the body. Rows and noise are those of `factor`. Without `body_from_camera`, that pose is a variable, the last one.
 
     ```toml
     [[factors]]
@@ -856,11 +857,12 @@ def on_body(
 
     Args:
         factor: Factor with one or more variables of type `se3`.
-        body_from_camera: Pose of the camera in the body frame.
+        body_from_camera: Pose of the camera in the body frame. Default: it is a further variable of type
+            `se3`, the last one.
         poses: Variables that are poses of the camera, as indices into `keys` from 0. Default: all of type
             `se3`.
     """
-    return Factor("on_body", {"factor": factor, "body_from_camera": untagged(body_from_camera), "poses": poses})
+    return Factor("on_body", {"factor": factor, "body_from_camera": body_from_camera, "poses": poses})
 
 
 def on_object(*, up: Numbers | None = None) -> Factor:
