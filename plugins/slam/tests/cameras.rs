@@ -63,10 +63,9 @@ fn both_cameras_map_the_room_in_batch_and_stream() {
     // the poses are those of the first camera, the boxes of the second one
     sequence.detections.retain(|detection| detection.camera.name == "rear");
     let (of_rear, _) = estimate(&run, sequence);
-    for (estimate, objects) in [(of_both, 22), (of_rear, 12)] {
+    for (estimate, objects, limit) in [(of_both, 22, 0.2), (of_rear, 12, 0.4)] {
         let (found, error) = (estimate.landmarks().len(), largest_error(&estimate));
-        println!("{found} objects, {error} m");
-        assert!(found >= objects && error < 0.2, "{found} {error}");
+        assert!(found >= objects && error < limit, "{found} objects, {error} m");
     }
 }
 
@@ -99,6 +98,5 @@ fn a_wrong_pose_of_a_camera_is_reported() {
     let (_, warnings) = estimate(&run, sequence);
     let reported = warnings.iter().find(|warning| warning.contains("`rear`")).cloned();
     let reported = reported.unwrap_or_else(|| panic!("{warnings:?}"));
-    println!("{reported}");
     assert!(reported.contains("`source.cameras.rear.body_from_camera`"), "{reported}");
 }
