@@ -1,6 +1,5 @@
 //! Runs and experiments from their documents, and the command line.
 use crate::errors;
-use crate::input::to_python;
 use crate::solution::Watch;
 use crate::threads::detach;
 use manifactor::config::{Diagnostics, Document, Format};
@@ -13,7 +12,7 @@ use manifactor::slam::run::{Run, RunError, StreamWatcher};
 use manifactor::slam::run_document::{RunDocument, RunVariant};
 use manifactor::slam::sequence::Observation;
 use manifactor::slam::source::InputFolders;
-use manifactor::solve::Interrupt;
+use manifactor::solve::{Interrupt, Observer};
 use manifactor::viz::run_page;
 use manifactor_cli::{Failure, write_experiment};
 use pyo3::prelude::*;
@@ -77,9 +76,10 @@ fn online(
     set: Vec<String>,
     data: Option<PathBuf>,
     lines: Option<Py<PyAny>>,
-    on_frame: Option<Py<PyAny>>,
+    on_frame: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Told> {
     let mut watch = Watch::new(None);
+    let mut frames = Frames { watch: Watch::new(on_frame), objects: ObjectUpdates::default() };
     let read = open(&config, json, &set).and_then(|document| RunDocument::read(&document));
     let document = read.map_err(|error| errors::document(&error))?;
     let done = detach(py, || {
@@ -88,12 +88,12 @@ fn online(
             let lines = PythonLines { lines, pending: Cursor::default() };
             run.read_frames_from("frames", Box::new(BufReader::new(lines)));
         }
-        let mut frames = Frames { on_frame, objects: ObjectUpdates::default() };
         let online = |variant: &RunVariant, run: &mut Run<'_>| {
             run.run_variant_online(variant, &mut frames, &mut watch).map(|(estimate, _)| estimate)
         };
         report_of(run, &document, online)
     })?;
+    frames.watch.finish()?;
     watch.finish()?;
     done.map_err(|error: String| errors::solve(error))
 }
@@ -148,37 +148,13 @@ impl Read for PythonLines {
 
 /// Passes each frame to a Python function.
 struct Frames {
-    on_frame: Option<Py<PyAny>>,
+    watch: Watch,
     objects: ObjectUpdates,
-}
-
-impl Frames {
-    /// Returns `Break` after an exception, or if the function returned `False`.
-    fn flow(goes_on: PyResult<bool>) -> ControlFlow<()> {
-        match goes_on {
-            Ok(true) if !crate::raised::has_raised() => ControlFlow::Continue(()),
-            Ok(_) => ControlFlow::Break(()),
-            Err(error) => {
-                crate::raised::store_exception(error);
-                ControlFlow::Break(())
-            }
-        }
-    }
-
-    fn call(&self, update: &serde_json::Value) -> PyResult<bool> {
-        Python::attach(|py| {
-            py.check_signals()?;
-            let Some(on_frame) = &self.on_frame else { return Ok(true) };
-            let goes_on = on_frame.bind(py).call1((to_python(py, update)?,))?;
-            // a function that returns None does not end the stream
-            Ok(goes_on.is_none() || goes_on.is_truthy()?)
-        })
-    }
 }
 
 impl StreamWatcher for Frames {
     fn on_idle(&mut self) -> ControlFlow<()> {
-        Self::flow(Python::attach(|py| py.check_signals().map(|()| true)))
+        self.watch.poll()
     }
 
     fn on_frame(
@@ -192,13 +168,13 @@ impl StreamWatcher for Frames {
             Ok(report) => json!({ "seconds": seconds, "report": report, "map": self.objects.take(mapper) }),
             Err(error) => json!({ "seconds": seconds, "error": error.to_string() }),
         };
-        Self::flow(self.call(&update))
+        self.watch.call(&update)
     }
 
     fn on_end(&mut self, mapper: &mut Mapper) {
         let changed = self.objects.take(mapper);
         if !changed.is_empty() {
-            _ = Self::flow(self.call(&json!({ "map": changed })));
+            _ = self.watch.call(&json!({ "map": changed }));
         }
     }
 }

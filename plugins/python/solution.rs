@@ -14,6 +14,7 @@ use manifactor::solve::{
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -35,6 +36,18 @@ impl Watch {
         crate::raised::raise()
     }
 
+    /// Calls the function with a value as Python objects. It ends the work by returning `False`.
+    pub(crate) fn call(&mut self, value: &impl Serialize) -> ControlFlow<()> {
+        let looked = Python::attach(|py| {
+            py.check_signals()?;
+            let Some(observer) = &self.observer else { return Ok(true) };
+            let goes_on = observer.bind(py).call1((to_python(py, value)?,))?;
+            // a function that returns None does not end the work
+            Ok(goes_on.is_none() || goes_on.is_truthy()?)
+        });
+        self.flow(looked)
+    }
+
     fn flow(&mut self, looked: PyResult<bool>) -> ControlFlow<()> {
         match looked {
             Ok(true) if !crate::raised::has_raised() => ControlFlow::Continue(()),
@@ -49,14 +62,7 @@ impl Watch {
 
 impl Observer for Watch {
     fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()> {
-        let looked = Python::attach(|py| {
-            py.check_signals()?;
-            let Some(observer) = &self.observer else { return Ok(true) };
-            let goes_on = observer.bind(py).call1((to_python(py, record)?,))?;
-            // a function that returns None does not end the solve
-            Ok(goes_on.is_none() || goes_on.is_truthy()?)
-        });
-        self.flow(looked)
+        self.call(record)
     }
 
     fn poll(&mut self) -> ControlFlow<()> {

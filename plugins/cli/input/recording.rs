@@ -2,6 +2,7 @@
 use crate::failure::Failure;
 use crate::output;
 use manifactor::config::{Document, Format};
+use manifactor::slam::camera::is_name_character;
 use manifactor::slam::ros::{Contents, Role, TopicContents};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -81,10 +82,9 @@ fn further_cameras(contents: &Contents, first: &str) -> String {
     for (boxes, topic) in contents.with_role(Role::Detections) {
         let Some(frame) = topic.frame.as_deref().filter(|frame| *frame != first) else { continue };
         let Some((info, _)) = calibration(contents, frame) else { continue };
-        let is_word = |c: char| c.is_alphanumeric() || ['_', '-'].contains(&c);
-        let name: String = frame.chars().map(|c| if is_word(c) { c } else { '_' }).collect();
+        let name: String = frame.chars().map(|c| if is_name_character(c) { c } else { '_' }).collect();
         let settings = format!("{name} = {{ detections = {boxes:?}, camera_info = {info:?} }}");
-        cameras.entry(frame).or_insert(settings);
+        cameras.entry(name).or_insert(settings);
     }
     match cameras.is_empty() {
         true => String::new(),

@@ -164,14 +164,12 @@ impl Estimate {
         let (most, loss) = (settings.objects.refinements, settings.detections.loss.as_ref());
         let Some(variance) = &settings.variance_components else {
             return Self::solve(sequence, mapping, start, most, settings, observer)?
-                .complete(settings, observer)?
-                .check_extrinsics(settings, observer);
+                .complete(settings, observer);
         };
         let begin = VarianceComponents::initial(&mapping, variance);
         begin.apply_to_graph(&mut mapping, variance, loss)?;
         let estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
-        let estimate = estimate.with_noise(variance, settings, observer)?;
-        estimate.complete(settings, observer)?.check_extrinsics(settings, observer)
+        estimate.with_noise(variance, settings, observer)?.complete(settings, observer)
     }
 
     /// Alternates between estimating the noise and solving.

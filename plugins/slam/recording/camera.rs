@@ -43,6 +43,11 @@ impl MountedCamera {
     }
 }
 
+/// Returns whether the name of a further camera may have this character.
+pub fn is_name_character(c: char) -> bool {
+    c.is_alphanumeric() || ['_', '-'].contains(&c)
+}
+
 /// Error for the name of a further camera that cannot be part of a file's name.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("`source.cameras` has the name {name:?}: expected letters, digits, `_` and `-`")]
@@ -70,8 +75,7 @@ impl Cameras {
     /// # Errors
     /// If the name cannot be part of a file's name.
     pub fn add(&mut self, name: &str, model: Camera, first_from_camera: Se3) -> Result<(), CameraNameError> {
-        let is_word = |c: char| c.is_alphanumeric() || ['_', '-'].contains(&c);
-        if name.is_empty() || !name.chars().all(is_word) {
+        if name.is_empty() || !name.chars().all(is_name_character) {
             return Err(CameraNameError { name: name.to_owned() });
         }
         let (name, index) = (name.to_owned(), self.others.len() + 1);

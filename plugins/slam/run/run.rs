@@ -136,7 +136,7 @@ pub fn estimate(
     let clock = Instant::now();
     let MappedSequence { sequence, mapping, settings: begun, association, found, held_out } =
         MappedSequence::new(sequence, settings, observer)?;
-    let estimate = Estimate::new(sequence, mapping, &begun, observer)?;
+    let estimate = Estimate::new(sequence, mapping, &begun, observer)?.check_extrinsics(&begun, observer)?;
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.association = association;
     report.held_out = HeldOutReport::new(&estimate, &held_out, settings);

@@ -39,6 +39,7 @@ fn estimate(run: &RunDocument, sequence: Sequence) -> (Estimate, Vec<String>) {
     let settings = &run.variants[0].settings;
     let mapping = Mapping::new(&sequence, settings).unwrap();
     let estimate = Estimate::new(Arc::new(sequence), mapping, settings, &mut Silent).unwrap();
+    let estimate = estimate.check_extrinsics(settings, &mut Silent).unwrap();
     let report = VariantReport::new("", &estimate, settings, 0.0);
     let warnings = report.warnings.iter().map(ToString::to_string).collect();
     (estimate, warnings)

@@ -19,7 +19,7 @@ impl Estimate {
     ///
     /// # Errors
     /// If the graph cannot be compiled.
-    pub(super) fn check_extrinsics(
+    pub fn check_extrinsics(
         mut self,
         settings: &RunSettings,
         observer: &mut dyn Observer,

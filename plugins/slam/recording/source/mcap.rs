@@ -140,7 +140,7 @@ impl SequenceSource for Mcap {
         for (i, (name, further)) in self.cameras.iter().enumerate() {
             let calibration = messages.calibrations.get(i + 1);
             let lens = self.lens(&file, further.camera.as_ref(), calibration, folders)?;
-            rig.add(name, lens, self.further_pose(&file, &messages, i + 1, further)?)?;
+            rig.add(name, lens, self.further_pose(&file, &messages, (name, i + 1), further)?)?;
         }
         let (mut images, mut rows, mut unused) = self.detections(&messages.boxes, &rig.cameras);
         if let Some(file) = &self.detections_file {
@@ -276,36 +276,36 @@ impl Mcap {
         &self,
         file: &Path,
         messages: &RecordedMessages,
-        index: usize,
+        (name, index): (&str, usize),
         further: &FurtherMcapCamera,
     ) -> Result<Se3, McapError> {
         let no_transform = |source| McapError::NoTransform { file: file.to_owned(), source };
+        let constant_pose = |camera: &str| {
+            let body = self.body_frame(file, messages)?;
+            if camera == body {
+                return Ok(Se3::identity());
+            }
+            if !messages.transforms.times(body, camera).map_err(no_transform)?.is_empty() {
+                let [camera, body] = [camera, body].map(str::to_owned);
+                return Err(McapError::MovingCamera { file: file.to_owned(), camera, body });
+            }
+            messages.transforms.pose(body, camera, 0.0).map_err(no_transform)
+        };
+        let first = self.camera_frame.as_deref().or(messages.camera_frame.as_deref());
+        if let Some(first) = first.filter(|_| self.body_from_camera.is_none()) {
+            constant_pose(first)?;
+        }
         if let Some(pose) = further.body_from_camera {
             return Ok(pose);
         }
-        let body = self.body_frame(file, messages)?;
         let frame = further.camera_frame.clone().or_else(|| messages.frame_of(index));
         let camera = frame.ok_or_else(|| McapError::NoFrame {
             file: file.to_owned(),
             topic: further.detections.clone(),
             what: "the frame of the camera",
-            setting: "cameras".into(),
+            setting: format!("cameras.{name}.camera_frame").into(),
         })?;
-        let moves = |camera: &str| -> Result<bool, McapError> {
-            Ok(camera != body && !messages.transforms.times(body, camera).map_err(no_transform)?.is_empty())
-        };
-        let first = self.camera_frame.as_deref().or(messages.camera_frame.as_deref());
-        let first = first.filter(|_| self.body_from_camera.is_none()).unwrap_or(body);
-        for frame in [&camera, first] {
-            if moves(frame)? {
-                let [camera, body] = [frame, body].map(str::to_owned);
-                return Err(McapError::MovingCamera { file: file.to_owned(), camera, body });
-            }
-        }
-        if camera == body {
-            return Ok(Se3::identity());
-        }
-        messages.transforms.pose(body, &camera, 0.0).map_err(no_transform)
+        constant_pose(&camera)
     }
 
     /// Returns the poses of the camera in the odometry frame, and the pose of the camera on the body if it is

@@ -82,7 +82,7 @@ pub fn online(
     watch.on_end(&mut taken.mapper);
     let (mapper, sequence, history) = taken.into_parts();
     let association = history.report(&*settings.association, mapper.id_changes());
-    let estimate = mapper.finish(Arc::new(sequence), observer)?;
+    let estimate = mapper.finish(Arc::new(sequence), observer)?.check_extrinsics(settings, observer)?;
     progress.compare_live_poses(&estimate, &settings.evaluation);
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.association = association;

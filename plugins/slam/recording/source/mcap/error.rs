@@ -76,6 +76,16 @@ pub enum McapError {
         /// The reason.
         source: TransformError,
     },
+    /// A further camera shares its topic of boxes, but does not say which frame is its own.
+    #[error("{}: `source.cameras.{camera}` shares the topic `{topic}` with another camera: set its `camera_frame`", file.display())]
+    SharedTopic {
+        /// The recording.
+        file: PathBuf,
+        /// Name of the camera.
+        camera: String,
+        /// The topic.
+        topic: String,
+    },
     /// A camera moves on the body, but several cameras need constant poses.
     #[error("{}: the frame `{camera}` moves in `{body}`: with several cameras, give each a constant `body_from_camera`", file.display())]
     MovingCamera {

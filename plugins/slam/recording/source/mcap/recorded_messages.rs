@@ -104,6 +104,12 @@ impl RecordedMessages {
         let mut topics =
             vec![topic_of(source.camera.as_ref(), "camera_info", named, frame_of_boxes.as_deref())?];
         for (name, further) in &source.cameras {
+            let is_same = |other: &FurtherMcapCamera| other.detections == further.detections;
+            let sharing = source.cameras.values().filter(|other| is_same(other)).count();
+            if further.camera_frame.is_none() && (sharing > 1 || further.detections == detections) {
+                let (camera, topic) = (name.clone(), further.detections.clone());
+                return Err(McapError::SharedTopic { file: file.to_owned(), camera, topic });
+            }
             let setting = format!("cameras.{name}.detections");
             let topic =
                 source.topic(file, &contents, Role::Detections, (&setting, Some(&further.detections)), "")?;

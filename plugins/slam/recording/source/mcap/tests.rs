@@ -187,6 +187,21 @@ mod recordings {
         let moving = messages().into_iter().chain(still).chain(rear_moves);
         let error = load(settings("/rear/detections"), moving).unwrap_err().to_string();
         assert!(error.contains("the frame `rear` moves in `base_link`"), "{error}");
+        // a constant pose of the further camera does not help if the first one moves
+        let pose = json!({"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0]});
+        let mut given = settings("/rear/detections");
+        given["cameras"]["rear"]["body_from_camera"] = pose;
+        let first_moves = (0..20).map(|i| {
+            let t = 0.1 * f64::from(i);
+            ("/tf", t, transform_message(100.0 + t, "base_link", "camera", &body(t)))
+        });
+        let moving = without("/tf_static").chain(rear("/rear/detections")).chain(first_moves);
+        let error = load(given, moving).unwrap_err().to_string();
+        assert!(error.contains("the frame `camera` moves in `base_link`"), "{error}");
+        let mut shared = settings("/detections");
+        shared["detections"] = "/detections".into();
+        let error = load(shared, messages().into_iter().chain(rear("/detections"))).unwrap_err().to_string();
+        assert!(error.contains("`source.cameras.rear` shares the topic `/detections`"), "{error}");
         let error = load(settings("/left"), messages()).unwrap_err().to_string();
         assert!(error.contains("`source.cameras.rear.detections` names `/left`"), "{error}");
     }
