@@ -26,8 +26,8 @@ pub use bundle::{
 };
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{
-    BearingRange2, BearingRange3, Between, ChordalBetween, ConstantVelocity, Landmark, Located, OnBody,
-    OnBodyError, Position, Prior, Range, ScaledBetween,
+    BearingRange2, BearingRange3, Between, ChordalBetween, ConstantVelocity, Heading, Landmark, Located,
+    OnBody, OnBodyError, Position, Prior, Range, ScaledBetween,
 };
 pub use groups::{
     AngleError, Coordinates, CoordinatesError, ImuBias, LieGroup, MatrixError, Point1, Point2, Point3, Rn,

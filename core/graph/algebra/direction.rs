@@ -17,6 +17,8 @@ pub struct Direction(UnitVector3<f64>);
 pub struct NoDirection(pub [f64; 3]);
 
 impl Direction {
+    /// The x axis.
+    pub const X: Direction = Direction(UnitVector3::new_unchecked(Vector3::new(1.0, 0.0, 0.0)));
     /// The z axis, the default for up.
     pub const Z: Direction = Direction(UnitVector3::new_unchecked(Vector3::new(0.0, 0.0, 1.0)));
 

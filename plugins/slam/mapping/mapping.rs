@@ -215,7 +215,7 @@ impl Mapping {
                 let (place, value) = self.values.find(key)?;
                 Some((place, value.erased().type_id()))
             };
-            let entry = factor.entry(&sequence.frames).map_err(|error| error.to_string());
+            let entry = factor.entry(&sequence.frames, self.frame.up).map_err(|error| error.to_string());
             let fits = entry.and_then(|entry| {
                 let mut errors = vec![];
                 let resolved = entry.resolve(0, find, &mut errors);

@@ -189,7 +189,8 @@ impl Mapper {
 
     /// Adds a factor, or replaces the one with its id.
     fn push_pose_factor(&mut self, factor: &PoseFactor) -> Result<(), String> {
-        let entry = factor.entry(&self.frames).map_err(|error| error.to_string())?;
+        let up = self.up.map_frame().and_then(|frame| frame.up);
+        let entry = factor.entry(&self.frames, up).map_err(|error| error.to_string())?;
         let replaced = factor.id.as_ref().and_then(|id| self.pose_factors.get(id)).copied();
         if replaced.is_some_and(|replaced| self.smoother.entry(replaced).is_none()) {
             return Err("a pose of the factor it replaces has left the window; the change counts in the final map only".into());

@@ -5,7 +5,7 @@ use crate::keys::{is_pose_or_object, pose_key};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::loss::Loss;
-use manifactor_graph::{Factor, FactorEntry, Key, Manifold, Noise};
+use manifactor_graph::{Direction, Factor, FactorEntry, Key, Manifold, Noise};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -84,6 +84,9 @@ pub enum PoseGraphError {
         /// The timestamp, in seconds.
         timestamp: f64,
     },
+    /// A factor needs the up direction, and nothing gives it.
+    #[error("the up direction is unknown: give `up` in the factor, or `gravity` in the document")]
+    NoUp,
     /// A factor without a pose or variable.
     #[error("`keys` is empty")]
     NoKeys,
@@ -94,11 +97,12 @@ fn nearest_frame(timestamp: Option<f64>) -> String {
 }
 
 impl PoseFactor {
-    /// Returns the factor between the poses of `frames` and other variables.
+    /// Returns the factor between the poses of `frames` and other variables. `up` is the world's up direction, for factors
+    /// that leave it open.
     ///
     /// # Errors
-    /// If there is no such frame, or a key is that of a pose or an object.
-    pub fn entry(&self, frames: &[Frame]) -> Result<FactorEntry, PoseGraphError> {
+    /// If there is no such frame, a key is that of a pose or an object, or the up direction is needed and unknown.
+    pub fn entry(&self, frames: &[Frame], up: Option<Direction>) -> Result<FactorEntry, PoseGraphError> {
         let key = |key: &PoseFactorKey| match key {
             PoseFactorKey::Timestamp(timestamp) => frame_at(frames, *timestamp).map(pose_key),
             PoseFactorKey::Key(key) if is_pose_or_object(key) => {
@@ -110,7 +114,13 @@ impl PoseFactor {
         if keys.is_empty() {
             return Err(PoseGraphError::NoKeys);
         }
-        let (factor, noise, loss) = (self.factor.clone(), self.noise.clone(), self.loss.clone());
+        let leaves_up_open = self.factor.with_up(Direction::Z).is_some();
+        let filled = match up {
+            None if leaves_up_open => return Err(PoseGraphError::NoUp),
+            known => known.and_then(|up| self.factor.with_up(up)).map(Arc::from),
+        };
+        let factor = filled.unwrap_or_else(|| self.factor.clone());
+        let (noise, loss) = (self.noise.clone(), self.loss.clone());
         // the name distinguishes a factor between consecutive frames from odometry, which has none
         Ok(FactorEntry { keys, name: Some(self.label().into()), factor, noise, loss })
     }
@@ -285,6 +295,26 @@ mod tests {
         let mut frames = frames();
         correct_frames(&mut frames, &[shifted(2.0, 2.0, 1.0), shifted(2.0, 2.0, 3.0)]);
         assert!((frames[2].world_from_camera.translation.y - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_factor_that_leaves_up_open_gets_that_of_the_world() {
+        let read = |more: &str| {
+            let factor = format!(r#"{{ "type": "heading_se3", "heading": 0.1{more} }}"#);
+            let text = format!(r#"{{ "keys": [1.0], "factor": {factor}, "noise": {{ "sigma": 0.1 }} }}"#);
+            serde_json::from_str::<PoseFactor>(&text).unwrap()
+        };
+        let down = Direction::new(-Vector3::y()).unwrap();
+        let used = |factor: &PoseFactor, up| {
+            let entry = factor.entry(&frames(), up)?;
+            Ok(serde_json::to_value(&entry.factor).unwrap()["up"].clone())
+        };
+        let open = read("");
+        assert_eq!(used(&open, Some(down)), Ok(serde_json::json!([0.0, -1.0, 0.0])));
+        assert_eq!(used(&open, None), Err(PoseGraphError::NoUp));
+        let given = read(r#", "up": [0.0, 0.0, 1.0]"#);
+        assert_eq!(used(&given, Some(down)), Ok(serde_json::json!([0.0, 0.0, 1.0])));
+        assert!(used(&given, None).is_ok());
     }
 
     #[test]
