@@ -16,8 +16,8 @@ use crate::failure::Failure;
 use crate::output;
 use access::Access;
 use manifactor::slam::estimate::Estimate;
-use manifactor::slam::online::{FrameError, FrameReport, Mapper};
-use manifactor::slam::sequence::Observation;
+use manifactor::slam::online::Mapper;
+use manifactor::slam::run::MappedFrame;
 use manifactor::solve::{IterationRecord, Observer};
 use manifactor::viz::{LiveMap, Phase};
 use serde_json::json;
@@ -87,18 +87,12 @@ impl View {
     }
 
     /// Shows the result of a frame.
-    pub(crate) fn frame(
-        &self,
-        report: Result<&FrameReport, &FrameError>,
-        observation: Option<&Observation>,
-        mapper: &mut Mapper,
-        seconds: f64,
-    ) {
+    pub(crate) fn frame(&self, frame: &mut MappedFrame<'_>) {
         let is_due = server::watchers(&self.map) > 0 && Instant::now() >= self.due.get();
-        self.change(|map| map.add_frame(report, observation, mapper, seconds));
+        self.change(|map| map.add_frame(frame));
         if is_due {
             let began = Instant::now();
-            self.refresh(mapper);
+            self.refresh(frame.mapper);
             self.due.set(Instant::now() + REFRESH.0.max(began.elapsed() * REFRESH.1));
         }
     }

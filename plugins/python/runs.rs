@@ -5,12 +5,11 @@ use crate::threads::detach;
 use manifactor::config::{Diagnostics, Document, Format};
 use manifactor::slam::estimate::Estimate;
 use manifactor::slam::experiment::{self, Experiment, ExperimentProgress, Shard, Trial, TrialLog};
-use manifactor::slam::online::{FrameError, FrameReport, Mapper, ObjectUpdates};
+use manifactor::slam::online::ObjectUpdates;
 use manifactor::slam::output::OutputFolder;
 use manifactor::slam::record::{RunRecord, VariantRecord};
-use manifactor::slam::run::{Run, RunError, StreamWatcher};
+use manifactor::slam::run::{MappedFrame, Run, RunError, StreamEvent, StreamWatcher};
 use manifactor::slam::run_document::{RunDocument, RunVariant};
-use manifactor::slam::sequence::Observation;
 use manifactor::slam::source::InputFolders;
 use manifactor::solve::{Interrupt, Observer};
 use manifactor::viz::run_page;
@@ -78,7 +77,6 @@ fn online(
     lines: Option<Py<PyAny>>,
     on_frame: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Told> {
-    let mut watch = Watch::new(None);
     let mut frames = Frames { watch: Watch::new(on_frame), objects: ObjectUpdates::default() };
     let read = open(&config, json, &set).and_then(|document| RunDocument::read(&document));
     let document = read.map_err(|error| errors::document(&error))?;
@@ -89,12 +87,11 @@ fn online(
             run.read_frames_from("frames", Box::new(BufReader::new(lines)));
         }
         let online = |variant: &RunVariant, run: &mut Run<'_>| {
-            run.run_variant_online(variant, &mut frames, &mut watch).map(|(estimate, _)| estimate)
+            run.run_variant_online(variant, &mut frames).map(|(estimate, _)| estimate)
         };
         report_of(run, &document, online)
     })?;
     frames.watch.finish()?;
-    watch.finish()?;
     done.map_err(|error: String| errors::solve(error))
 }
 
@@ -153,28 +150,23 @@ struct Frames {
 }
 
 impl StreamWatcher for Frames {
-    fn on_idle(&mut self) -> ControlFlow<()> {
-        self.watch.poll()
-    }
-
-    fn on_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        _observation: Option<&Observation>,
-        mapper: &mut Mapper,
-        seconds: f64,
-    ) -> ControlFlow<()> {
-        let update = match report {
-            Ok(report) => json!({ "seconds": seconds, "report": report, "map": self.objects.take(mapper) }),
-            Err(error) => json!({ "seconds": seconds, "error": error.to_string() }),
-        };
-        self.watch.call(&update)
-    }
-
-    fn on_end(&mut self, mapper: &mut Mapper) {
-        let changed = self.objects.take(mapper);
-        if !changed.is_empty() {
-            _ = self.watch.call(&json!({ "map": changed }));
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()> {
+        match event {
+            StreamEvent::Idle | StreamEvent::FrameArrived { .. } | StreamEvent::Iteration(_) => {
+                self.watch.poll()
+            }
+            StreamEvent::Frame(MappedFrame { report, mapper, seconds, .. }) => {
+                self.watch.call(&match report {
+                    Ok(report) => {
+                        json!({ "seconds": seconds, "report": report, "map": self.objects.take(mapper) })
+                    }
+                    Err(error) => json!({ "seconds": seconds, "error": error.to_string() }),
+                })
+            }
+            StreamEvent::LastFrame { mapper } => match self.objects.take(mapper) {
+                changed if changed.is_empty() => ControlFlow::Continue(()),
+                changed => self.watch.call(&json!({ "map": changed })),
+            },
         }
     }
 }

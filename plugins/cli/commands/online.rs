@@ -8,10 +8,9 @@ use crate::output::watch::Watch as Progress;
 use crate::status::Status;
 use crate::view::{SolveDisplay, View, address};
 use clap::Args;
-use manifactor::slam::online::{FrameError, FrameReport, Mapper, ObjectUpdates};
-use manifactor::slam::run::{RunError, StreamWatcher};
-use manifactor::slam::sequence::Observation;
-use manifactor::solve::{AllObservers, Interrupt};
+use manifactor::slam::online::{FrameReport, Mapper, ObjectUpdates};
+use manifactor::slam::run::{MappedFrame, RunError, StreamEvent, StreamWatcher};
+use manifactor::solve::{Interrupt, Observer};
 use serde_json::json;
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
@@ -60,7 +59,7 @@ fn faster(text: &str) -> Result<f64, String> {
 
 impl Online {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
-        let mut interrupt = interrupt::on_ctrl_c();
+        let interrupt = interrupt::on_ctrl_c();
         let for_results = interrupt.clone();
         let mut view = self.view.map(View::open).transpose()?;
         let report = self.options.run_as("online", verbose, for_results, |run, variant| {
@@ -71,19 +70,16 @@ impl Online {
                 check_journal(journal, &run.document.output)?;
                 run.journal_frames(journal.clone());
             }
-            let mut progress = Progress::new(verbose, &variant.name);
-            let interrupted = interrupt.clone();
-            let mut solve = SolveDisplay(view.as_ref());
-            let mut observers = AllObservers(vec![&mut progress, &mut interrupt, &mut solve]);
             let mut frames = Frames {
                 command: self,
-                interrupt: interrupted,
+                interrupt: interrupt.clone(),
+                progress: Progress::new(verbose, &variant.name),
                 view: view.as_ref(),
                 frames: 0,
                 begun: None,
                 objects: ObjectUpdates::default(),
             };
-            let done = run.run_variant_online(variant, &mut frames, &mut observers)?;
+            let done = run.run_variant_online(variant, &mut frames)?;
             if let Some(view) = &view {
                 view.show_estimate(&done.0);
             }
@@ -119,10 +115,11 @@ fn check_journal(journal: &Path, output: &Path) -> Result<(), RunError> {
     }
 }
 
-/// Reports frames and waits for their times.
+/// Reports frames and the final solve, and waits for the times of the frames.
 struct Frames<'a> {
     command: &'a Online,
     interrupt: Interrupt,
+    progress: Progress,
     view: Option<&'a View>,
     frames: u64,
     /// Arrival time of the first frame, and its timestamp.
@@ -137,10 +134,6 @@ const NAP: Duration = Duration::from_millis(50);
 impl Frames<'_> {
     fn is_interrupted(&self) -> bool {
         self.interrupt.0.load(Ordering::Relaxed)
-    }
-
-    fn goes_on(&self) -> ControlFlow<()> {
-        if self.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     fn print_frame(&mut self, report: &FrameReport, mapper: &Mapper, took: f64) {
@@ -166,70 +159,51 @@ impl Frames<'_> {
             ));
         }
     }
-}
 
-impl StreamWatcher for Frames<'_> {
-    fn on_idle(&mut self) -> ControlFlow<()> {
-        self.goes_on()
-    }
-
-    fn before_frame(&mut self, timestamp: f64) -> ControlFlow<()> {
-        let Some(rate) = self.command.rate else { return ControlFlow::Continue(()) };
+    /// Waits until the frame is due.
+    fn wait_for(&mut self, timestamp: f64) {
+        let Some(rate) = self.command.rate else { return };
         let (begun, first) = *self.begun.get_or_insert((Instant::now(), timestamp));
         // a timestamp that is not after the first one needs no waiting
         let due = Duration::try_from_secs_f64((timestamp - first) / rate).unwrap_or_default();
         while let Some(left) = due.checked_sub(begun.elapsed()).filter(|_| !self.is_interrupted()) {
             std::thread::sleep(left.min(NAP));
         }
-        self.goes_on()
     }
 
-    fn on_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        observation: Option<&Observation>,
-        mapper: &mut Mapper,
-        took: f64,
-    ) -> ControlFlow<()> {
+    fn report_frame(&mut self, mut frame: MappedFrame<'_>) {
         self.frames += 1;
         if let Some(view) = self.view {
-            view.frame(report, observation, mapper, took);
+            view.frame(&mut frame);
         }
-        match report {
-            Ok(report) => {
-                report.refused.iter().for_each(|refused| output::print_note(refused));
-                if let Some(located) = &report.located {
-                    let (frames, objects) =
-                        (count(report.frame + 1, "frame"), count(located.matches.len(), "object"));
-                    output::print_note(&format!(
-                        "after {frames}, relocalized in the prior map by {objects}: from now on, names and poses are those of that map"
-                    ));
-                }
-                if let Some(jump) = &report.jump {
-                    let (frames, objects) =
-                        (count(report.frame + 1, "frame"), count(jump.matches.len(), "object"));
-                    output::print_note(&format!(
-                        "after {frames}, relocalized by {objects} after a jump of the odometry: the poses since then are corrected, and names may differ"
-                    ));
-                }
-                if let Some(noise) = &report.noise {
-                    let frames = count(report.frame + 1, "frame");
-                    output::print_note(&format!("after {frames}, noise estimated: {noise}"));
-                }
-                if self.frames.is_multiple_of(self.command.every)
-                    || report.located.is_some()
-                    || report.jump.is_some()
-                    || report.noise.is_some()
-                {
-                    self.print_frame(report, mapper, took);
-                }
-            }
-            Err(error) => output::print_note(&error.to_string()),
+        let report = match frame.report {
+            Ok(report) => report,
+            Err(error) => return output::print_note(&error.to_string()),
+        };
+        report.refused.iter().for_each(|refused| output::print_note(refused));
+        let frames = count(report.frame + 1, "frame");
+        if let Some(located) = &report.located {
+            output::print_note(&format!(
+                "after {frames}, relocalized in the prior map by {}: from now on, names and poses are those of that map",
+                count(located.matches.len(), "object")
+            ));
         }
-        self.goes_on()
+        if let Some(jump) = &report.jump {
+            output::print_note(&format!(
+                "after {frames}, relocalized by {} after a jump of the odometry: the poses since then are corrected, and names may differ",
+                count(jump.matches.len(), "object")
+            ));
+        }
+        if let Some(noise) = &report.noise {
+            output::print_note(&format!("after {frames}, noise estimated: {noise}"));
+        }
+        let is_special = report.located.is_some() || report.jump.is_some() || report.noise.is_some();
+        if is_special || self.frames.is_multiple_of(self.command.every) {
+            self.print_frame(report, frame.mapper, frame.seconds);
+        }
     }
 
-    fn on_end(&mut self, mapper: &mut Mapper) {
+    fn report_last_frame(&mut self, mapper: &mut Mapper) {
         if self.command.map {
             let changed = self.objects.take(mapper);
             if !changed.is_empty() {
@@ -239,5 +213,22 @@ impl StreamWatcher for Frames<'_> {
         if let Some(view) = self.view {
             view.refresh(mapper);
         }
+    }
+}
+
+impl StreamWatcher for Frames<'_> {
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()> {
+        match event {
+            StreamEvent::Idle => {}
+            StreamEvent::FrameArrived { timestamp } => self.wait_for(timestamp),
+            StreamEvent::Frame(frame) => self.report_frame(frame),
+            StreamEvent::LastFrame { mapper } => self.report_last_frame(mapper),
+            StreamEvent::Iteration(record) => {
+                // neither ends the solve
+                _ = self.progress.iteration(record);
+                _ = SolveDisplay(self.view).iteration(record);
+            }
+        }
+        if self.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }

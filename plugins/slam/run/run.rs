@@ -26,7 +26,7 @@ mod noise;
 mod state;
 mod stream;
 
-pub use stream::{StreamWatcher, online};
+pub use stream::{MappedFrame, StreamEvent, StreamWatcher, online};
 
 /// Reason why a variant could not be run.
 #[derive(Debug, thiserror::Error)]
@@ -246,7 +246,6 @@ impl<'a> Run<'a> {
         &mut self,
         variant: &RunVariant,
         watch: &mut dyn StreamWatcher,
-        observer: &mut dyn Observer,
     ) -> Result<(Estimate, VariantReport), RunError> {
         let clock = Instant::now();
         let source = &variant.settings.source;
@@ -266,7 +265,7 @@ impl<'a> Run<'a> {
             Some(path) => journaled(stream, path, &variant.settings.fingerprint())?,
             None => stream,
         };
-        let done = online(&variant.name, stream, &variant.settings, watch, observer)?;
+        let done = online(&variant.name, stream, &variant.settings, watch)?;
         Ok(self.journal_stream(variant, done, clock))
     }
 

@@ -254,7 +254,7 @@ fn what_is_associated_wrongly_in_a_crowd_is_mended_while_frames_come_and_when_no
     assert!(with.0 > 10 && with.0 > without.0 && without.1 > with.1, "{with:?} {without:?}");
     for settings in [settings, never] {
         let stream = Arc::clone(&sequence).into();
-        let found = run::online("crowd", stream, &settings, &mut RelocalizationLog::default(), &mut Silent);
+        let found = run::online("crowd", stream, &settings, &mut RelocalizationLog::default());
         let report = found.unwrap().1.association.unwrap();
         let (then, now) = (report.at_the_time.unwrap().f1, report.in_the_end.unwrap().f1);
         assert!(now > then, "{now} {then}");

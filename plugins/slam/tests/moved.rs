@@ -87,10 +87,7 @@ fn what_is_moved_within_a_stream_is_reported_and_not_in_its_map() {
             let left = objects_at(map.objects.iter().map(|object| object.quadric.centroid()), &truth);
             assert!(left.is_disjoint(&old) && left.len() >= 11, "{association} {left:?}");
         };
-        is_right(
-            online("stream", all.clone().into(), &settings, &mut RelocalizationLog::default(), &mut Silent)
-                .unwrap(),
-        );
+        is_right(online("stream", all.clone().into(), &settings, &mut RelocalizationLog::default()).unwrap());
         is_right(estimate("batch", all, &settings, &mut Silent).unwrap());
     }
 }

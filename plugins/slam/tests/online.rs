@@ -7,7 +7,7 @@ use manifactor_slam::mapping::Mapping;
 use manifactor_slam::measurement::Quantities;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::report::VariantReport;
-use manifactor_slam::run::{Run, StreamWatcher};
+use manifactor_slam::run::{MappedFrame, Run, StreamEvent, StreamWatcher};
 use manifactor_slam::run_document::{RunDocument, RunVariant};
 use manifactor_slam::sequence::{
     Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Sequence,
@@ -29,13 +29,8 @@ impl CollectedReports {
 }
 
 impl StreamWatcher for CollectedReports {
-    fn on_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        _: Option<&Observation>,
-        _: &mut Mapper,
-        _: f64,
-    ) -> ControlFlow<()> {
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()> {
+        let StreamEvent::Frame(MappedFrame { report, .. }) = event else { return ControlFlow::Continue(()) };
         self.0.push(report.unwrap().clone());
         ControlFlow::Continue(())
     }
@@ -46,16 +41,24 @@ impl StreamWatcher for CollectedReports {
 struct MapChecks {
     frames: usize,
     ends: usize,
+    iterations: usize,
 }
 
 impl StreamWatcher for MapChecks {
-    fn on_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        observation: Option<&Observation>,
-        mapper: &mut Mapper,
-        _: f64,
-    ) -> ControlFlow<()> {
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()> {
+        let MappedFrame { report, observation, mapper, .. } = match event {
+            StreamEvent::Frame(frame) => frame,
+            StreamEvent::LastFrame { mapper } => {
+                assert!(mapper.pose_of(0).is_some() && mapper.up().is_some());
+                self.ends += 1;
+                return ControlFlow::Continue(());
+            }
+            StreamEvent::Iteration(_) => {
+                self.iterations += 1;
+                return ControlFlow::Continue(());
+            }
+            _ => return ControlFlow::Continue(()),
+        };
         let (report, observation) = (report.unwrap(), observation.unwrap());
         assert_eq!(report.box_objects.len(), observation.detections.len());
         assert_eq!(mapper.objects().count(), mapper.mapped_objects());
@@ -67,11 +70,6 @@ impl StreamWatcher for MapChecks {
         self.frames += 1;
         ControlFlow::Continue(())
     }
-
-    fn on_end(&mut self, mapper: &mut Mapper) {
-        assert!(mapper.pose_of(0).is_some() && mapper.up().is_some());
-        self.ends += 1;
-    }
 }
 
 #[test]
@@ -79,8 +77,9 @@ fn the_map_can_be_looked_at_after_each_frame_and_has_all_poses_with_a_window() {
     let document = run_of(DESK, &["online.window.poses=20"]);
     let mut looking = MapChecks::default();
     let mut run = Run::new(&document, None);
-    run.run_variant_online(&document.variants[0], &mut looking, &mut Silent).unwrap();
+    run.run_variant_online(&document.variants[0], &mut looking).unwrap();
     assert_eq!((looking.frames, looking.ends), (80, 1));
+    assert!(looking.iterations > 0, "the final solve");
 }
 
 /// A desk, and a camera that moves around it.
@@ -103,7 +102,7 @@ pub(crate) fn both(
     data: Option<PathBuf>,
 ) -> (VariantReport, VariantReport, CollectedReports) {
     let (mut kept, mut run) = (CollectedReports::default(), Run::new(run, data));
-    let (_, online) = run.run_variant_online(variant, &mut kept, &mut Silent).unwrap();
+    let (_, online) = run.run_variant_online(variant, &mut kept).unwrap();
     // a stream adds a weak prior for the shape of all objects
     let batch = RunVariant { settings: variant.settings.clone().for_stream(), ..variant.clone() };
     let (_, batch) = run.run_variant(&batch, &mut Silent).unwrap();

@@ -378,7 +378,7 @@ fn lines_give_the_same_graph_to_a_batch_and_a_stream_also_from_a_journal() {
             run.journal_frames(folder.path().join(journal));
         }
         let mut reports = crate::online::CollectedReports::default();
-        let (estimate, report) = run.run_variant_online(variant, &mut reports, &mut Silent).unwrap();
+        let (estimate, report) = run.run_variant_online(variant, &mut reports).unwrap();
         (estimate, report, reports)
     };
     let (estimate, report, reports) = stream(None);

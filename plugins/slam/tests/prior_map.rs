@@ -3,15 +3,14 @@ use manifactor_config::{Document, Format};
 use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
 use manifactor_quadric::{BoundingBox, QuadricPrior};
-use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::output::map_of;
 use manifactor_slam::output::{write_variant, write_whole};
 use manifactor_slam::prior_map::{PriorMap, PriorObject};
 use manifactor_slam::record::VariantRecord;
 use manifactor_slam::report::{PriorMapReport, VariantReport};
-use manifactor_slam::run::{MappedSequence, StreamWatcher, estimate, online};
+use manifactor_slam::run::{MappedFrame, MappedSequence, StreamEvent, StreamWatcher, estimate, online};
 use manifactor_slam::run_document::RunDocument;
-use manifactor_slam::sequence::{ObjectId, Observation, Sequence};
+use manifactor_slam::sequence::{ObjectId, Sequence};
 use manifactor_slam::settings::RunSettings;
 use manifactor_slam::source::InputFolders;
 use manifactor_solve::Silent;
@@ -84,13 +83,8 @@ pub(crate) struct RelocalizationLog {
 }
 
 impl StreamWatcher for RelocalizationLog {
-    fn on_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        _: Option<&Observation>,
-        _: &mut Mapper,
-        _: f64,
-    ) -> ControlFlow<()> {
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()> {
+        let StreamEvent::Frame(MappedFrame { report, .. }) = event else { return ControlFlow::Continue(()) };
         let report = report.unwrap();
         if self.poses.is_empty() {
             self.first = report.box_objects.iter().copied().flatten().collect();
@@ -131,7 +125,7 @@ fn a_stream_that_begins_anywhere_finds_its_place() {
     for start in [0, 90] {
         let stream = part_of_sequence(&all, start..240);
         let mut watch = RelocalizationLog::default();
-        let (estimate, report) = online("again", stream.into(), &settings, &mut watch, &mut Silent).unwrap();
+        let (estimate, report) = online("again", stream.into(), &settings, &mut watch).unwrap();
         let at = watch.at.unwrap();
         let [deg, m] = off(&all, start + at, &watch.poses[at]);
         assert!(deg < 5.0 && m < 0.1, "{start}: {deg} {m}");
@@ -152,14 +146,12 @@ fn a_batch_finds_the_same_place_as_a_stream() {
     let all = part_of_sequence(&sequence(&settings), 40..240);
     let mapped = MappedSequence::new(all.clone(), &settings, &mut Silent).unwrap();
     let (_, report) =
-        online("stream", all.clone().into(), &settings, &mut RelocalizationLog::default(), &mut Silent)
-            .unwrap();
+        online("stream", all.clone().into(), &settings, &mut RelocalizationLog::default()).unwrap();
     assert_eq!(mapped.found, warning_texts(&report).found);
     // counts of the first map are dropped: every object added since exists at the end, or was merged or
     // removed
     let known = begun(folder.path(), &warning_texts(&report).found.as_ref().unwrap().located.start, &[]);
-    let (_, alone) =
-        online("known", all.clone().into(), &known, &mut RelocalizationLog::default(), &mut Silent).unwrap();
+    let (_, alone) = online("known", all.clone().into(), &known, &mut RelocalizationLog::default()).unwrap();
     let [found, alone] = [report.online.unwrap(), alone.online.unwrap()];
     assert_eq!(found.seconds.len(), all.frames.len());
     assert!(
@@ -180,7 +172,7 @@ fn a_place_that_is_known_is_not_looked_for() {
     let first = all.frames[0].world_from_camera;
     let settings = begun(folder.path(), &first, &["association.type=likelihood"]);
     let mut watch = RelocalizationLog::default();
-    let (_, report) = online("again", all.clone().into(), &settings, &mut watch, &mut Silent).unwrap();
+    let (_, report) = online("again", all.clone().into(), &settings, &mut watch).unwrap();
     let prior = warning_texts(&report);
     assert!(watch.at.is_none() && prior.found.is_none() && prior.is_located);
     let error = first.between(&watch.poses[0]);
@@ -196,14 +188,9 @@ fn another_table_is_not_taken_for_this_one() {
     mapped(folder.path(), |_| {});
     for seed in [7, 8, 9] {
         let settings = in_map(folder.path(), &[&format!("source.scene.seed={seed}")]);
-        let (estimate, report) = online(
-            "other",
-            sequence(&settings).into(),
-            &settings,
-            &mut RelocalizationLog::default(),
-            &mut Silent,
-        )
-        .unwrap();
+        let (estimate, report) =
+            online("other", sequence(&settings).into(), &settings, &mut RelocalizationLog::default())
+                .unwrap();
         let prior = warning_texts(&report);
         assert!(!prior.is_located && prior.seen.is_empty() && prior.added.is_empty());
         assert!(report.warnings.iter().any(|warning| warning.to_string().contains("not clear where in")));
@@ -223,7 +210,7 @@ fn a_room_with_a_few_things_that_stand_as_in_the_map_is_not_taken_for_it() {
     few.detections.retain(|detection| detection.object.is_some_and(|id| id.0 <= 5));
     for (stream, is_located) in [(all, true), (Arc::new(few), false)] {
         let mut watch = RelocalizationLog::default();
-        let (_, report) = online("stream", stream.into(), &settings, &mut watch, &mut Silent).unwrap();
+        let (_, report) = online("stream", stream.into(), &settings, &mut watch).unwrap();
         assert_eq!(warning_texts(&report).is_located, is_located, "{:?} of {}", watch.at, map.objects.len());
     }
 }
@@ -245,8 +232,7 @@ fn removed_objects_are_reported_and_new_ones_are_added() {
     };
     second.detections.retain(known(gone));
     let (estimate, report) =
-        online("second", Arc::new(second).into(), &settings, &mut RelocalizationLog::default(), &mut Silent)
-            .unwrap();
+        online("second", Arc::new(second).into(), &settings, &mut RelocalizationLog::default()).unwrap();
     let prior = warning_texts(&report);
     let near = |id: &ObjectId, map: &PriorMap, place: Vector3<f64>| {
         map.object(*id).is_some_and(|object| (object.quadric.centroid() - place).norm() < 0.1)
@@ -329,7 +315,7 @@ fn a_frame_that_is_left_out_counts_once_and_in_no_number() {
     all.frames[2].world_from_camera.translation.x = f64::NAN;
     let all = Arc::new(all);
     let mut watch = SkippedFrames(0, None);
-    let (_, report) = online("stream", all.clone().into(), &settings, &mut watch, &mut Silent).unwrap();
+    let (_, report) = online("stream", all.clone().into(), &settings, &mut watch).unwrap();
     let online = report.online.as_ref().unwrap();
     assert_eq!((online.refusals, online.refused.len(), watch.0), (1, 1, 1));
     let mapped = MappedSequence::new(all, &settings, &mut Silent);
@@ -342,13 +328,8 @@ fn a_frame_that_is_left_out_counts_once_and_in_no_number() {
 struct SkippedFrames(usize, Option<usize>);
 
 impl StreamWatcher for SkippedFrames {
-    fn on_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        _: Option<&Observation>,
-        _: &mut Mapper,
-        _: f64,
-    ) -> ControlFlow<()> {
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()> {
+        let StreamEvent::Frame(MappedFrame { report, .. }) = event else { return ControlFlow::Continue(()) };
         self.0 += usize::from(report.is_err());
         self.1 = self.1.or(report.ok().filter(|report| report.located.is_some()).map(|report| report.frame));
         ControlFlow::Continue(())

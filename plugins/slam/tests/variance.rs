@@ -165,8 +165,7 @@ fn a_stream_trusts_its_odometry_until_its_noise_is_estimated() {
 fn a_stream_without_objects_keeps_the_initial_noise() {
     let document = run_of(STREAM, &["source.scene.objects=2"]);
     let mut kept = CollectedReports::default();
-    let (_, online) =
-        Run::new(&document, None).run_variant_online(&document.variants[0], &mut kept, &mut Silent).unwrap();
+    let (_, online) = Run::new(&document, None).run_variant_online(&document.variants[0], &mut kept).unwrap();
     assert!(kept.reports().iter().all(|report| report.noise.is_none()));
     assert_eq!(online.online.unwrap().refusals, 0);
 }

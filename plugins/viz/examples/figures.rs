@@ -14,12 +14,10 @@ use manifactor_quadric::DualQuadric;
 use manifactor_semantic as _;
 use manifactor_slam::experiment::{self, Experiment, ExperimentSummary, TrialLog, trials_table};
 use manifactor_slam::mapping::measurements::ObjectMeasurements;
-use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::output::OutputFolder;
 use manifactor_slam::record::VariantRecord;
-use manifactor_slam::run::{Run, StreamWatcher};
+use manifactor_slam::run::{MappedFrame, Run, StreamEvent, StreamWatcher};
 use manifactor_slam::run_document::RunDocument;
-use manifactor_slam::sequence::Observation;
 use manifactor_slam::source::InputFolders;
 use manifactor_solve::{
     Dogleg, GaussNewton, Interrupt, LevenbergMarquardt, Optimizer, Silent, Solution, solve,
@@ -129,14 +127,10 @@ struct Snapshots {
 const EVERY: usize = 4;
 
 impl StreamWatcher for Snapshots {
-    fn on_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        _: Option<&Observation>,
-        mapper: &mut Mapper,
-        _: f64,
-    ) -> ControlFlow<()> {
-        let Ok(report) = report else { return ControlFlow::Continue(()) };
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()> {
+        let StreamEvent::Frame(MappedFrame { report: Ok(report), mapper, .. }) = event else {
+            return ControlFlow::Continue(());
+        };
         self.seen += 1;
         if self.seen % EVERY != 1 {
             return ControlFlow::Continue(());
@@ -174,7 +168,7 @@ fn grown() -> Fallible<&'static Grown> {
     let variant = document.variants.first().ok_or("the document has no variant")?;
     let mut snapshots = Snapshots { movie: None, seen: 0 };
     let mut run = Run::new(&document, None);
-    let (estimate, report) = run.run_variant_online(variant, &mut snapshots, &mut Silent)?;
+    let (estimate, report) = run.run_variant_online(variant, &mut snapshots)?;
     let seconds = report.online.map(|online| online.seconds).unwrap_or_default();
     let movie = snapshots.movie.ok_or("no frame was mapped")?;
     let record = VariantRecord::new(variant, &estimate);

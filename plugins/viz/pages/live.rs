@@ -12,8 +12,9 @@ use manifactor_quadric::{BoundingBox, Camera, DualQuadric};
 use manifactor_slam::estimate::{Estimate, LandmarkEstimate};
 use manifactor_slam::mapping::object_key;
 use manifactor_slam::measurements::ObjectMeasurements;
-use manifactor_slam::online::{FrameError, FrameReport, Mapper};
+use manifactor_slam::online::{FrameReport, Mapper};
 use manifactor_slam::record::{BoxRecord, FrameRecord, ObjectRecord, PoseRecord};
+use manifactor_slam::run::MappedFrame;
 use manifactor_slam::sequence::{ObjectId, Observation};
 use nalgebra::Vector3;
 use notes::Notes;
@@ -88,22 +89,17 @@ impl LiveMap {
 
     /// Adds the result of a frame. The time depends on the number of objects and boxes, but not on the
     /// length of the path.
-    pub fn add_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        observation: Option<&Observation>,
-        mapper: &Mapper,
-        seconds: f64,
-    ) {
+    pub fn add_frame(&mut self, frame: &MappedFrame<'_>) {
         self.phase = Phase::Running;
-        let report = match report {
+        let mapper = &*frame.mapper;
+        let report = match frame.report {
             Ok(report) => report,
             Err(error) => return self.notes.add_skipped_frame(self.frames, &error.to_string()),
         };
         if self.seconds.len() == LATENCIES {
             self.seconds.pop_front();
         }
-        self.seconds.push_back(seconds);
+        self.seconds.push_back(frame.seconds);
         (self.frames, self.timestamp) = (report.frame + 1, report.timestamp);
         self.boxes_so_far += report.boxes;
         if let Some(located) = &report.located {
@@ -127,7 +123,7 @@ impl LiveMap {
             self.undetermined = variables.chain(directions).take(NAMED).collect();
         }
         self.update_objects(mapper);
-        if let Some(observation) = observation {
+        if let Some(observation) = frame.observation {
             let odometry = mapper.odometry(observation).unwrap_or(report.pose);
             let tracked = |pose| PoseRecord { pose, error: None, relative: None };
             self.path.push(FrameRecord {

@@ -11,12 +11,12 @@ use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
 use manifactor_slam::metrics::{Alignment, align, associate};
-use manifactor_slam::online::{FrameError, FrameReport, Mapper, Relocalization};
+use manifactor_slam::online::{FrameReport, Relocalization};
 use manifactor_slam::output::map_of;
 use manifactor_slam::output::write_whole;
-use manifactor_slam::run::{StreamWatcher, online};
+use manifactor_slam::run::{MappedFrame, StreamEvent, StreamWatcher, online};
 use manifactor_slam::run_document::RunDocument;
-use manifactor_slam::sequence::{Observation, Sequence};
+use manifactor_slam::sequence::Sequence;
 use manifactor_slam::source::InputFolders;
 use manifactor_solve::Silent;
 use std::ops::{ControlFlow, Range};
@@ -65,13 +65,10 @@ struct Found {
 }
 
 impl StreamWatcher for Found {
-    fn on_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        _: Option<&Observation>,
-        _: &mut Mapper,
-        seconds: f64,
-    ) -> ControlFlow<()> {
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()> {
+        let StreamEvent::Frame(MappedFrame { report, seconds, .. }) = event else {
+            return ControlFlow::Continue(());
+        };
         self.longest = self.longest.max(seconds);
         if let Ok(FrameReport { frame, timestamp, pose, located: Some(located), .. }) = report {
             self.at =
@@ -129,8 +126,7 @@ pub(super) fn run(arguments: Arguments) -> BenchmarkResult {
         let frames = place.rsplit(':').next().unwrap();
         let stream = Arc::new(part(sequence, range(frames, sequence.frames.len())));
         let (mut found, began) = (Found::default(), stream.frames[0].timestamp);
-        let (estimate, report) =
-            online(place, stream.into(), &variant.settings, &mut found, &mut Silent).unwrap();
+        let (estimate, report) = online(place, stream.into(), &variant.settings, &mut found).unwrap();
         let Some((at, poses, located)) = found.at else {
             println!("{place}: not found");
             continue;

@@ -5,11 +5,9 @@
 use super::{Arguments, BenchmarkResult};
 use manifactor_config::Document;
 use manifactor_formats::replay::Latencies;
-use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::report::{TrajectoryReport, VariantReport};
-use manifactor_slam::run::{Run, StreamWatcher};
+use manifactor_slam::run::{MappedFrame, Run, StreamEvent, StreamWatcher};
 use manifactor_slam::run_document::RunDocument;
-use manifactor_slam::sequence::Observation;
 use manifactor_solve::{Optimizer, Silent};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -25,13 +23,10 @@ struct Gaps {
 }
 
 impl StreamWatcher for Gaps {
-    fn on_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        _: Option<&Observation>,
-        mapper: &mut Mapper,
-        seconds: f64,
-    ) -> ControlFlow<()> {
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()> {
+        let StreamEvent::Frame(MappedFrame { report, mapper, seconds, .. }) = event else {
+            return ControlFlow::Continue(());
+        };
         self.frames += 1;
         if let Ok(report) = report {
             if report.updates.iter().any(|u| u.solved_batch) {
@@ -78,7 +73,7 @@ pub(super) fn run(mut arguments: Arguments) -> BenchmarkResult {
         let mut run = Run::new(&document, data.clone().map(Into::into));
         let solver = variant.settings.solver.clone();
         let mut gaps = Gaps { every, frames: 0, solver, found: vec![], batches: vec![], longest: vec![] };
-        let (_, report) = run.run_variant_online(variant, &mut gaps, &mut Silent).unwrap();
+        let (_, report) = run.run_variant_online(variant, &mut gaps).unwrap();
         let (_, batch) = run.run_variant(variant, &mut Silent).unwrap();
         print_report(&report, &batch);
         gaps.found.sort_by(f64::total_cmp);

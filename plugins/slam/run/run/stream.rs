@@ -10,25 +10,22 @@ use manifactor_online::{FrameError, FrameReport, Mapper};
 use manifactor_recording::sequence::Observation;
 use manifactor_recording::stream::confirmed::OrderedFrames;
 use manifactor_recording::stream::{FrameStream, PrefetchedFrames};
-use manifactor_solve::Observer;
+use manifactor_solve::{IterationRecord, Observer};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Maps a stream frame by frame, solves the whole graph at the end, and evaluates the result. Calls `watch`
-/// for each frame with the map and the processing time in seconds; `watch` can end the stream. A separate
-/// thread waits for the next frame. If the stream ends before its source, that thread ends with the next
-/// frame.
+/// Maps a stream frame by frame, solves the whole graph at the end, and evaluates the result. `watch` gets each
+/// event, and can end the stream or the solve. A separate thread waits for the next frame. If the stream ends before
+/// its source, that thread ends with the next frame.
 ///
 /// # Errors
-/// If the smoother cannot be started, or the final graph cannot be created. Rejected frames are reported to
-/// `watch`.
+/// If the smoother cannot be started, or the final graph cannot be created. Rejected frames are events.
 pub fn online(
     name: &str,
     stream: FrameStream,
     settings: &RunSettings,
     watch: &mut dyn StreamWatcher,
-    observer: &mut dyn Observer,
 ) -> Result<(Estimate, VariantReport), RunError> {
     let clock = Instant::now();
     let lost = stream.lost.clone();
@@ -36,7 +33,7 @@ pub fn online(
     let (mut progress, mut search, mut found) = (OnlineReport::default(), StartSearch::new(settings), None);
     let mut awaited = PrefetchedFrames::new(Box::new(OrderedFrames::new(stream.observations)));
     loop {
-        let observation = match awaited.next(|| watch.on_idle()) {
+        let observation = match awaited.next(|| watch.event(StreamEvent::Idle)) {
             ControlFlow::Continue(Some(observation)) => observation,
             ControlFlow::Continue(None) => break,
             ControlFlow::Break(()) => {
@@ -46,7 +43,7 @@ pub fn online(
         };
         if let Ok(observation) = &observation
             && observation.frame.timestamp > stream.recorded_frames
-            && watch.before_frame(observation.frame.timestamp).is_break()
+            && watch.event(StreamEvent::FrameArrived { timestamp: observation.frame.timestamp }).is_break()
         {
             progress.interrupted = true;
             break;
@@ -68,8 +65,9 @@ pub fn online(
         }
         let seconds = began.elapsed().as_secs_f64();
         progress.add_frame(report.as_ref(), seconds);
-        let goes_on = watch.on_frame(report.as_ref(), observation.as_ref().ok(), &mut taken.mapper, seconds);
-        if goes_on.is_break() {
+        let (report, observation) = (report.as_ref(), observation.as_ref().ok());
+        let mapped = MappedFrame { report, observation, mapper: &mut taken.mapper, seconds };
+        if watch.event(StreamEvent::Frame(mapped)).is_break() {
             progress.interrupted = true;
             break;
         }
@@ -79,7 +77,9 @@ pub fn online(
     drop(awaited);
     progress.add_frame_report(&taken.mapper.finish_association());
     progress.add_final_counts(&mut taken.mapper);
-    watch.on_end(&mut taken.mapper);
+    // the stream has ended anyway
+    _ = watch.event(StreamEvent::LastFrame { mapper: &mut taken.mapper });
+    let observer = &mut SolveEvents(watch);
     let (mapper, sequence, history) = taken.into_parts();
     let association = history.report(&*settings.association, mapper.id_changes());
     let estimate = mapper.finish(Arc::new(sequence), observer)?.check_extrinsics(settings, observer)?;
@@ -96,29 +96,62 @@ pub fn online(
     Ok((estimate, report))
 }
 
-/// Observer of a stream of frames.
+/// An event of a stream.
+#[derive(Debug)]
+pub enum StreamEvent<'a> {
+    /// Comes now and then while no frame arrives, and while a long step of the final solve runs.
+    Idle,
+    /// A frame was read that is not in the journal; it is mapped when the watcher returns.
+    FrameArrived {
+        /// Timestamp, in seconds.
+        timestamp: f64,
+    },
+    /// A frame was mapped or rejected.
+    Frame(MappedFrame<'a>),
+    /// The last frame was mapped. The batch solve of the whole graph follows.
+    LastFrame {
+        /// The map.
+        mapper: &'a mut Mapper,
+    },
+    /// A step of a batch solve.
+    Iteration(&'a IterationRecord),
+}
+
+/// A frame after its update of the map.
+#[derive(Debug)]
+pub struct MappedFrame<'a> {
+    /// The result, or the reason why the frame was rejected.
+    pub report: Result<&'a FrameReport, &'a FrameError>,
+    /// The frame, if it was readable.
+    pub observation: Option<&'a Observation>,
+    /// The map.
+    pub mapper: &'a mut Mapper,
+    /// Processing time, in seconds.
+    pub seconds: f64,
+}
+
+/// Receives the events of a stream, in order. Closures are watchers.
 pub trait StreamWatcher {
-    /// Called now and then while no frame arrives. `Break` ends the stream.
-    fn on_idle(&mut self) -> ControlFlow<()> {
-        ControlFlow::Continue(())
+    /// `Break` ends the stream after this event; a frame that has only arrived is left out. While the graph is
+    /// solved, it ends the solve with the best values so far.
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()>;
+}
+
+impl<F: FnMut(StreamEvent<'_>) -> ControlFlow<()>> StreamWatcher for F {
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()> {
+        self(event)
+    }
+}
+
+/// Passes the steps of a solve to the watcher of its stream.
+struct SolveEvents<'a>(&'a mut dyn StreamWatcher);
+
+impl Observer for SolveEvents<'_> {
+    fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()> {
+        self.0.event(StreamEvent::Iteration(record))
     }
 
-    /// Called before each frame with its timestamp in seconds. Returns when the frame is due. `Break` ends
-    /// the stream before it.
-    fn before_frame(&mut self, _timestamp: f64) -> ControlFlow<()> {
-        ControlFlow::Continue(())
+    fn poll(&mut self) -> ControlFlow<()> {
+        self.0.event(StreamEvent::Idle)
     }
-
-    /// Called after each frame with the result, the frame if it was readable, the map, and the processing
-    /// time in seconds.
-    fn on_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        observation: Option<&Observation>,
-        mapper: &mut Mapper,
-        seconds: f64,
-    ) -> ControlFlow<()>;
-
-    /// Called after the last frame, before the batch solve of the whole graph.
-    fn on_end(&mut self, _mapper: &mut Mapper) {}
 }

@@ -1,7 +1,7 @@
 use super::*;
 use manifactor_geometry::Se3;
 use manifactor_slam::output::map_of;
-use manifactor_slam::run::{StreamWatcher, estimate, online};
+use manifactor_slam::run::{StreamEvent, StreamWatcher, estimate, online};
 use manifactor_slam::settings::RunSettings;
 use manifactor_slam::source::InputFolders;
 use manifactor_solve::Silent;
@@ -43,15 +43,11 @@ struct Shown {
 }
 
 impl StreamWatcher for Shown {
-    fn on_frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        observation: Option<&Observation>,
-        mapper: &mut Mapper,
-        seconds: f64,
-    ) -> ControlFlow<()> {
+    fn event(&mut self, event: StreamEvent<'_>) -> ControlFlow<()> {
+        let StreamEvent::Frame(frame) = event else { return ControlFlow::Continue(()) };
+        let (report, mapper) = (frame.report, &*frame.mapper);
         let before: Vec<Se3> = self.live.path.frames().map(|frame| frame.odometry.pose).collect();
-        self.live.add_frame(report, observation, mapper, seconds);
+        self.live.add_frame(&frame);
         let Some(located) = report.ok().and_then(|report| report.located.as_ref()) else {
             return ControlFlow::Continue(());
         };
@@ -106,6 +102,6 @@ fn what_was_shown_moves_into_the_map_that_is_found() {
         stream.push(observation);
     }
     let mut shown = Shown { live: LiveMap::new("table", "only"), located: 0 };
-    online("second", Arc::new(stream).into(), &second, &mut shown, &mut Silent).unwrap();
+    online("second", Arc::new(stream).into(), &second, &mut shown).unwrap();
     assert_eq!(shown.located, 1);
 }
