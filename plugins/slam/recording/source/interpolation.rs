@@ -1,11 +1,14 @@
 //! Poses at the times of images, between the poses of a source.
+mod steps;
+
 use super::SourceError;
 use crate::sequence::pose_graph::PoseGraphChanges;
-use crate::sequence::{Acceleration, Observation, UnusedInput};
+use crate::sequence::{Acceleration, Frame, Observation, UnusedInput};
 use manifactor_formats::tum::StampedPose;
-use manifactor_geometry::Se3;
 use manifactor_graph::Manifold;
 use std::collections::VecDeque;
+use std::sync::Arc;
+use steps::{GivenNoise, GivenSteps, InterpolatedPose};
 
 /// Reason why an image has no pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,18 +29,33 @@ const TIME_ROUNDING_S: f64 = 2e-6;
 ///
 /// # Errors
 /// If there are no such neighbours.
-pub(super) fn pose_at(poses: &[StampedPose], timestamp: f64, max_gap: f64) -> Result<Se3, NoPose> {
+fn pose_at(poses: &[StampedPose], timestamp: f64, max_gap: f64) -> Result<InterpolatedPose, NoPose> {
     let after = poses.partition_point(|pose| pose.timestamp < timestamp);
     let to = poses.get(after).ok_or(NoPose::After)?;
     if to.timestamp == timestamp {
-        return Ok(to.pose);
+        return Ok(InterpolatedPose::at(to));
     }
     let from = after.checked_sub(1).and_then(|before| poses.get(before)).ok_or(NoPose::Before)?;
     let gap = to.timestamp - from.timestamp;
     if gap > max_gap + TIME_ROUNDING_S {
         return Err(NoPose::Gap(gap));
     }
-    Ok(from.interpolate(to, timestamp))
+    InterpolatedPose::between(&poses[..=after], timestamp).ok_or(NoPose::Before)
+}
+
+/// Returns a frame for each image that lies between two poses. Both are sorted by time.
+pub(super) fn interpolated_frames(
+    poses: &[StampedPose],
+    images: impl IntoIterator<Item = f64>,
+    max_gap: f64,
+) -> Vec<Frame> {
+    let mut before = None;
+    let frame = |timestamp: f64| {
+        let found = pose_at(poses, timestamp, max_gap).ok()?;
+        let added_variance = found.added_variance(before.replace(found).as_ref());
+        Some(Frame { added_variance, ..Frame::new(timestamp, found.pose) })
+    };
+    images.into_iter().filter_map(frame).collect()
 }
 
 /// A pose, an image, or both, as they arrive.
@@ -61,6 +79,9 @@ pub(super) struct InterpolatedFrames<I> {
     poses: Vec<StampedPose>,
     /// Images that wait for a pose, sorted by time.
     images: Vec<Observation>,
+    given: GivenSteps,
+    /// The pose of the last image that was released.
+    last: Option<InterpolatedPose>,
     /// Data of poses without an image, for the next frame.
     accelerometer: Vec<Acceleration>,
     pose_graph: PoseGraphChanges,
@@ -76,6 +97,8 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
             max_gap,
             poses: vec![],
             images: vec![],
+            given: GivenSteps::default(),
+            last: None,
             accelerometer: vec![],
             pose_graph: PoseGraphChanges::default(),
             unused: vec![],
@@ -92,6 +115,7 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
             return;
         }
         self.correct_poses(&observation.pose_graph.corrected);
+        self.take_noise(&mut observation, has_pose);
         if has_pose {
             let place = self.poses.partition_point(|before| before.timestamp < timestamp);
             match self.poses.get_mut(place).filter(|before| before.timestamp == timestamp) {
@@ -115,6 +139,45 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
         self.poses.drain(..old);
     }
 
+    /// Takes the noise of the step from the last pose to that of a line.
+    fn take_noise(&mut self, line: &mut Observation, has_pose: bool) {
+        let Some(noise) = line.frame.odometry_noise.take() else { return };
+        let Frame { timestamp, world_from_camera: pose, .. } = line.frame;
+        let from = self.poses.last().map(|last| last.timestamp);
+        let taken = match from.filter(|from| *from < timestamp) {
+            _ if !has_pose => Err("it belongs to a line with a pose".to_owned()),
+            Some(from) => self.given.push(from, StampedPose { timestamp, pose }, &noise),
+            None if from.is_none() => Ok(()),
+            None => Err("the pose comes after a later one".to_owned()),
+        };
+        if let Err(fault) = taken {
+            line.unused.push(UnusedInput::PoseGraph { timestamp, field: "odometry_noise".into(), fault });
+        }
+    }
+
+    /// Sets the pose of an image, and the noise of the step from the image before.
+    fn set_pose(&mut self, image: &mut Observation, pose: InterpolatedPose) {
+        let frame = &mut image.frame;
+        let timestamp = frame.timestamp;
+        frame.world_from_camera = pose.pose;
+        frame.added_variance = pose.added_variance(self.last.as_ref());
+        let from = self.last.map_or(f64::NEG_INFINITY, |last| last.timestamp());
+        let given = self.given.take(from, &StampedPose { timestamp, pose: pose.pose });
+        match given {
+            GivenNoise::Whole(noise) => frame.odometry_noise = Some(Arc::new(noise)),
+            GivenNoise::Partial if self.last.is_some() => {
+                let fault = "some poses since the last image have none".to_owned();
+                image.unused.push(UnusedInput::PoseGraph {
+                    timestamp,
+                    field: "odometry_noise".into(),
+                    fault,
+                });
+            }
+            GivenNoise::None | GivenNoise::Partial => {}
+        }
+        self.last = Some(pose);
+    }
+
     /// Keeps the data of a line that becomes no frame.
     fn keep_for_next(&mut self, mut line: Observation) {
         self.pose_graph.factors.append(&mut line.pose_graph.factors);
@@ -126,7 +189,7 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
     /// Moves the poses so far to the corrected odometry frame of the next ones.
     fn correct_poses(&mut self, corrected: &[StampedPose]) {
         let correction = |corrected: &StampedPose| {
-            let before = pose_at(&self.poses, corrected.timestamp, self.max_gap).ok()?;
+            let before = pose_at(&self.poses, corrected.timestamp, self.max_gap).ok()?.pose;
             Some((corrected.timestamp, corrected.pose.compose(&before.inverse())))
         };
         let newest = corrected.iter().filter_map(correction).max_by(|a, b| a.0.total_cmp(&b.0));
@@ -134,6 +197,7 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
             for stamped in &mut self.poses {
                 stamped.pose = correction.compose(&stamped.pose);
             }
+            self.given.move_by(&correction);
         }
     }
 
@@ -150,7 +214,7 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
             let timestamp = image.frame.timestamp;
             match pose_at(&self.poses, timestamp, self.max_gap) {
                 Ok(pose) => {
-                    image.frame.world_from_camera = pose;
+                    self.set_pose(&mut image, pose);
                     released.push(Ok(image));
                 }
                 Err(why) => {
@@ -199,8 +263,8 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> Iterator for Interpol
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sequence::Frame;
-    use manifactor_geometry::So3;
+    use manifactor_geometry::{Se3, So3};
+    use manifactor_graph::Noise;
     use nalgebra::{Vector3, Vector6};
 
     fn stamped(timestamp: f64) -> StampedPose {
@@ -211,11 +275,11 @@ mod tests {
     fn a_constant_twist_is_interpolated_exactly() {
         let poses = [1.0, 1.2, 1.4].map(stamped);
         for timestamp in [1.0, 1.07, 1.2, 1.33, 1.4] {
-            let pose = pose_at(&poses, timestamp, 0.25).unwrap();
-            assert!(stamped(timestamp).pose.local(&pose).norm() < 1e-12, "{timestamp}");
+            let found = pose_at(&poses, timestamp, 0.25).unwrap().pose;
+            assert!(stamped(timestamp).pose.local(&found).norm() < 1e-12, "{timestamp}");
         }
-        assert_eq!(pose_at(&poses, 0.9, 0.25), Err(NoPose::Before));
-        assert_eq!(pose_at(&poses, 1.5, 0.25), Err(NoPose::After));
+        assert!(matches!(pose_at(&poses, 0.9, 0.25), Err(NoPose::Before)));
+        assert!(matches!(pose_at(&poses, 1.5, 0.25), Err(NoPose::After)));
         assert!(matches!(pose_at(&poses, 1.1, 0.1), Err(NoPose::Gap(gap)) if (gap - 0.2).abs() < 1e-12));
     }
 
@@ -257,6 +321,28 @@ mod tests {
             .collect();
         let expected = ["0.5 Before", "1.25 1.25 2", "1.5 1.5 0", "1.75 1.75 0", "3 Gap(3.0)", "6 After"];
         assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn the_noise_of_poses_between_images_is_that_of_the_step() {
+        let noisy = |timestamp: f64, noise: Option<f64>| {
+            let mut read = pose(timestamp).unwrap();
+            read.observation.frame.odometry_noise = noise.map(|s| Arc::new(Noise::sigma(s).unwrap()));
+            Ok(read)
+        };
+        let of = |read: Vec<Result<PoseOrImage, SourceError>>| {
+            InterpolatedFrames::new(read.into_iter(), 1.0).map(Result::unwrap).collect::<Vec<_>>()
+        };
+        let read = (0..5).map(|i| noisy(f64::from(i), Some(0.1))).chain([image(0.5), image(3.5)]);
+        let frames = of(read.collect());
+        let noise = frames[1].frame.odometry_noise.as_ref().unwrap();
+        assert!((noise.information_matrix(6).unwrap()[(0, 0)] - 1.0 / 0.03).abs() < 1e-6);
+        let some = [noisy(0.0, None), noisy(1.0, Some(0.1)), image(0.5), noisy(2.0, None), image(1.5)];
+        let frames = of(some.into());
+        assert!(frames[1].frame.odometry_noise.is_none());
+        assert!(
+            matches!(&frames[1].unused[..], [UnusedInput::PoseGraph { field, .. }] if field == "odometry_noise")
+        );
     }
 
     /// Returns the timestamps of frames, and of images without a pose as negative numbers.
