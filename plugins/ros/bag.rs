@@ -1,21 +1,23 @@
-//! Messages of an MCAP file, in the order of the file.
+//! Messages of a recording, in the order of its files.
+mod folder;
+mod mcap_file;
+mod sqlite_file;
+
 use crate::decode::{DecodeError, Definition};
-use mcap::McapError;
-use mcap::records::Record;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use std::collections::HashMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Length of the longest record or chunk. Unit: bytes.
-const MAX_RECORD_BYTES: usize = 1 << 30;
+pub use folder::is_recording;
+
 /// First bytes of an SQLite file.
 const SQLITE: &[u8] = b"SQLite format 3";
 /// First bytes of a recording of ROS 1.
 const ROS_1: &[u8] = b"#ROSBAG";
 /// First bytes of an MCAP file.
 const MCAP: &[u8] = b"\x89MCAP";
+/// First bytes of data compressed by zstd.
+pub(crate) const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 
 /// Error that prevents reading a recording.
 #[derive(Debug, thiserror::Error)]
@@ -30,12 +32,20 @@ pub enum BagError {
         source: std::io::Error,
     },
     /// The file has a different format.
-    #[error("{}: expected an MCAP file, found {found}", path.display())]
+    #[error("{}: expected a recording of ROS 2 (MCAP or SQLite), found {found}", path.display())]
     Format {
         /// The file.
         path: PathBuf,
         /// The format, with a remedy if there is one.
         found: &'static str,
+    },
+    /// The database cannot be read.
+    #[error("{}: {source}", path.display())]
+    Database {
+        /// The file.
+        path: PathBuf,
+        /// Error of SQLite.
+        source: rusqlite::Error,
     },
 }
 
@@ -81,106 +91,57 @@ pub enum Ending {
     Fault(String),
 }
 
-/// Calls a function for each message of an MCAP file, in the order of the file. The memory does not depend on the
-/// length of the file.
+impl Ending {
+    /// Returns the ending of a recording of which only some messages were read.
+    fn after(messages: usize, fault: &str) -> Self {
+        Self::Fault(format!("{fault}, after {messages} messages"))
+    }
+}
+
+/// Calls a function for each message of a recording, in the order of the file: MCAP, or SQLite (db3). A folder is a
+/// recording in several files, which are read by their number. The memory does not depend on the length of the files.
 ///
 /// # Errors
-/// If the file cannot be read, or is not an MCAP file.
+/// If a file cannot be read or has another format, or a folder has no recording.
 pub fn read(path: &Path, mut visit: impl FnMut(BagMessage<'_>)) -> Result<Ending, BagError> {
-    let io = |source| BagError::Io { path: path.to_owned(), source };
-    let mut file = File::open(path).map_err(io)?;
-    let mut start = vec![];
-    Read::by_ref(&mut file).take(SQLITE.len() as u64).read_to_end(&mut start).map_err(io)?;
-    if let Some(found) = other_format(&start) {
-        return Err(BagError::Format { path: path.to_owned(), found });
-    }
-    let options = LinearReaderOptions::default()
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(MAX_RECORD_BYTES);
-    let mut reader = LinearReader::new_with_options(options);
-    reader.insert(start.len()).copy_from_slice(&start);
-    reader.notify_read(start.len());
-    let mut topics = Topics::default();
-    let mut messages = 0_usize;
-    while let Some(event) = reader.next_event() {
-        let fault = match event {
-            Ok(LinearReadEvent::ReadRequest(length)) => {
-                let read = file.read(reader.insert(length)).map_err(io)?;
-                reader.notify_read(read);
-                continue;
-            }
-            Ok(LinearReadEvent::Record { data, opcode }) => match mcap::parse_record(opcode, data) {
-                Ok(Record::Message { header, data }) => match topics.channels.get(&header.channel_id) {
-                    Some(topic) => {
-                        messages += 1;
-                        visit(BagMessage { topic, log_time: header.log_time as f64 * 1e-9, data: &data });
-                        continue;
-                    }
-                    None => format!("a message belongs to the unknown channel {}", header.channel_id),
-                },
-                Ok(record) => {
-                    topics.add(record);
-                    continue;
-                }
-                Err(error) => error.to_string(),
-            },
-            Err(McapError::UnexpectedEof | McapError::UnexpectedEoc) => "the file is cut off".to_owned(),
-            Err(error) => error.to_string(),
+    let mut ending = Ending::Complete;
+    for file in folder::files(path)? {
+        let found = match format(&file)? {
+            FileFormat::Mcap => mcap_file::read(&file, &mut visit)?,
+            FileFormat::Sqlite => sqlite_file::read(&file, &mut visit)?,
         };
-        return Ok(Ending::Fault(format!("{fault}, after {messages} messages")));
-    }
-    Ok(Ending::Complete)
-}
-
-fn other_format(start: &[u8]) -> Option<&'static str> {
-    match start {
-        [] => Some("an empty file"),
-        start if start.starts_with(MCAP) => None,
-        start if start == SQLITE => {
-            Some("a recording in SQLite (db3): convert it to MCAP with `ros2 bag convert`")
-        }
-        start if start.starts_with(ROS_1) => {
-            Some("a recording of ROS 1: convert it to MCAP with `mcap convert`")
-        }
-        _ => Some("something else"),
-    }
-}
-
-/// Topics so far, by the number of their channel.
-#[derive(Default)]
-struct Topics {
-    schemas: HashMap<u16, Schema>,
-    channels: HashMap<u16, Topic>,
-}
-
-/// Definition of a message type, as recorded.
-struct Schema {
-    name: String,
-    encoding: String,
-    text: Vec<u8>,
-}
-
-impl Topics {
-    fn add(&mut self, record: Record<'_>) {
-        match record {
-            Record::Schema { header, data } => {
-                let schema = Schema { name: header.name, encoding: header.encoding, text: data.into_owned() };
-                self.schemas.insert(header.id, schema);
-            }
-            Record::Channel(channel) if !self.channels.contains_key(&channel.id) => {
-                let schema = self.schemas.get(&channel.schema_id);
-                let message_type = schema.map_or(String::new(), |schema| schema.name.clone());
-                let definition = match schema {
-                    Some(Schema { name, encoding, text }) => {
-                        Definition::new(name, encoding, text, &channel.message_encoding)
-                    }
-                    None => Err(DecodeError::NoDefinition),
-                };
-                self.channels.insert(channel.id, Topic { name: channel.topic, message_type, definition });
-            }
-            _ => {}
+        // the first fault; the other files are read nevertheless
+        if ending == Ending::Complete {
+            ending = match found {
+                Ending::Fault(fault) if file != *path => {
+                    Ending::Fault(format!("{}: {fault}", file.display()))
+                }
+                found => found,
+            };
         }
     }
+    Ok(ending)
+}
+
+enum FileFormat {
+    Mcap,
+    Sqlite,
+}
+
+/// Returns the format of a file by its first bytes.
+fn format(path: &Path) -> Result<FileFormat, BagError> {
+    let io = |source| BagError::Io { path: path.to_owned(), source };
+    let mut start = vec![];
+    File::open(path).map_err(io)?.take(SQLITE.len() as u64).read_to_end(&mut start).map_err(io)?;
+    let found = match &start[..] {
+        start if start.starts_with(MCAP) => return Ok(FileFormat::Mcap),
+        start if start == SQLITE => return Ok(FileFormat::Sqlite),
+        [] => "an empty file",
+        start if start.starts_with(ROS_1) => "a recording of ROS 1: convert it to MCAP with `mcap convert`",
+        start if start.starts_with(ZSTD) => "a file compressed by zstd: decompress it with `zstd -d`",
+        _ => "something else",
+    };
+    Err(BagError::Format { path: path.to_owned(), found })
 }
 
 #[cfg(test)]
@@ -235,12 +196,7 @@ mod tests {
 
     #[test]
     fn other_formats_are_named() {
-        for (start, words) in [
-            ("SQLite format 3\0", "ros2 bag convert"),
-            ("#ROSBAG V2.0\n", "ROS 1"),
-            ("", "empty"),
-            ("PK", "something"),
-        ] {
+        for (start, words) in [("#ROSBAG V2.0\n", "ROS 1"), ("", "empty"), ("PK", "something")] {
             let file = tempfile::NamedTempFile::new().unwrap();
             std::fs::write(file.path(), start).unwrap();
             let error = read(file.path(), |_| ()).unwrap_err().to_string();

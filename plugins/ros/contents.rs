@@ -86,10 +86,10 @@ impl TopicContents {
 }
 
 impl Contents {
-    /// Reads the topics of an MCAP file.
+    /// Reads the topics of a recording, a file or a folder.
     ///
     /// # Errors
-    /// If the file cannot be read, or is not an MCAP file.
+    /// As [`read`].
     pub fn of(path: &Path) -> Result<Self, BagError> {
         let mut topics = BTreeMap::<String, TopicContents>::new();
         let ending = read(path, |message| {

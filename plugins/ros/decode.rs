@@ -1,4 +1,5 @@
 //! Decoding of messages by the definition of their type in the recording.
+use crate::bag::ZSTD;
 use re_cdr::{BigEndian, CdrEndian, CdrReader, LittleEndian};
 use re_ros_msg::MessageSchema;
 use re_ros_msg::message_spec::{
@@ -11,6 +12,8 @@ use std::collections::HashMap;
 const ENCODINGS: [&str; 2] = ["cdr", "ros2msg"];
 /// Bytes before the content: the byte order, and options.
 const HEADER_BYTES: usize = 4;
+/// Messages are padded to a multiple of this.
+const ALIGNMENT_BYTES: usize = 4;
 /// Largest depth of messages within messages.
 const MAX_DEPTH: usize = 32;
 /// Longest list of bytes that is decoded. Longer ones are images and point clouds.
@@ -47,6 +50,8 @@ pub(crate) struct Definition {
     main: MessageSpecification,
     /// Types that it contains, by `package/Name`.
     others: HashMap<String, MessageSpecification>,
+    /// True if the recording has no definition, so that the content has to show that this one is right.
+    is_assumed: bool,
 }
 
 impl Definition {
@@ -67,7 +72,12 @@ impl Definition {
         let MessageSchema { spec, dependencies } =
             MessageSchema::parse(name, text).map_err(|error| wrong(&format!("{error:#}")))?;
         let others = dependencies.into_iter().map(|spec| (short_name(&spec.name), spec)).collect();
-        Ok(Self { main: spec, others })
+        Ok(Self { main: spec, others, is_assumed: false })
+    }
+
+    /// Marks the definition as not recorded.
+    pub(crate) fn assumed(self) -> Self {
+        Self { is_assumed: true, ..self }
     }
 
     /// Decodes a message.
@@ -75,14 +85,31 @@ impl Definition {
         let Some((header, content)) = data.split_at_checked(HEADER_BYTES) else {
             return Err(DecodeError::Content("it is shorter than its header".into()));
         };
+        if header == ZSTD {
+            return Err(DecodeError::Content(
+                "messages are compressed one by one: convert the recording with `ros2 bag convert`".into(),
+            ));
+        }
         let decoded = match header[1] {
-            0 => self.message(&mut CdrReader::<BigEndian>::new(content), &self.main, 0),
-            1 => self.message(&mut CdrReader::<LittleEndian>::new(content), &self.main, 0),
+            0 => self.whole_message(&mut CdrReader::<BigEndian>::new(content)),
+            1 => self.whole_message(&mut CdrReader::<LittleEndian>::new(content)),
             other => {
                 Err(re_cdr::Error::Custom(format!("unknown representation {other}, expected plain CDR")))
             }
         };
         decoded.map_err(|error| DecodeError::Content(error.to_string()))
+    }
+
+    fn whole_message<B: CdrEndian>(&self, reader: &mut CdrReader<'_, B>) -> re_cdr::Result<Value> {
+        let message = self.message(reader, &self.main, 0)?;
+        if self.is_assumed && reader.remaining() >= ALIGNMENT_BYTES {
+            return Err(re_cdr::Error::Custom(format!(
+                "the recording has no definition, and the usual one leaves {} bytes more; convert the recording to MCAP on the \
+                 robot, with `ros2 bag convert`",
+                reader.remaining()
+            )));
+        }
+        Ok(message)
     }
 
     fn message<B: CdrEndian>(

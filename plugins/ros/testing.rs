@@ -1,9 +1,11 @@
 //! Recordings for tests.
 #![allow(clippy::unwrap_used, reason = "for tests")]
+use crate::definitions;
 use manifactor_geometry::Se3;
 use mcap::records::MessageHeader;
 use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
+use std::path::Path;
 
 /// Name and definition of a message type.
 pub type MessageType = (&'static str, &'static str);
@@ -11,51 +13,16 @@ pub type MessageType = (&'static str, &'static str);
 /// A text.
 pub const STRING: MessageType = ("std_msgs/msg/String", "string data");
 
-/// Definition of a type by its fields, with definitions of the types that it contains.
-macro_rules! definition {
-    ($fields:literal) => {
-        concat!(
-            $fields,
-            "\n===\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n",
-            "===\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
-            "===\nMSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n",
-            "===\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n",
-            "===\nMSG: geometry_msgs/Quaternion\nfloat64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n",
-            "===\nMSG: geometry_msgs/PoseWithCovariance\nPose pose\nfloat64[36] covariance\n",
-            "===\nMSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\nTransform transform\n",
-            "===\nMSG: geometry_msgs/Transform\nVector3 translation\nQuaternion rotation\n",
-            "===\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n",
-            "===\nMSG: vision_msgs/Detection2D\nstd_msgs/Header header\nObjectHypothesisWithPose[] results\nBoundingBox2D bbox\nstring id\n",
-            "===\nMSG: vision_msgs/ObjectHypothesisWithPose\nObjectHypothesis hypothesis\n",
-            "===\nMSG: vision_msgs/ObjectHypothesis\nstring class_id\nfloat64 score\n",
-            "===\nMSG: vision_msgs/BoundingBox2D\nvision_msgs/Pose2D center\nfloat64 size_x\nfloat64 size_y\n",
-            "===\nMSG: vision_msgs/Pose2D\nvision_msgs/Point2D position\nfloat64 theta\n",
-            "===\nMSG: vision_msgs/Point2D\nfloat64 x\nfloat64 y\n",
-        )
-    };
-}
-
 /// A pose.
-pub const POSE_STAMPED: MessageType =
-    ("geometry_msgs/msg/PoseStamped", definition!("std_msgs/Header header\ngeometry_msgs/Pose pose"));
-/// Odometry without the velocity.
-pub const ODOMETRY: MessageType = (
-    "nav_msgs/msg/Odometry",
-    definition!("std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose"),
-);
+pub const POSE_STAMPED: MessageType = ("geometry_msgs/msg/PoseStamped", definitions::POSE_STAMPED);
+/// Odometry.
+pub const ODOMETRY: MessageType = ("nav_msgs/msg/Odometry", definitions::ODOMETRY);
 /// Transforms between frames.
-pub const TRANSFORMS: MessageType =
-    ("tf2_msgs/msg/TFMessage", definition!("geometry_msgs/TransformStamped[] transforms"));
+pub const TRANSFORMS: MessageType = ("tf2_msgs/msg/TFMessage", definitions::TRANSFORMS);
 /// Calibration of a camera.
-pub const CAMERA_INFO: MessageType = (
-    "sensor_msgs/msg/CameraInfo",
-    definition!(
-        "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p"
-    ),
-);
+pub const CAMERA_INFO: MessageType = ("sensor_msgs/msg/CameraInfo", definitions::CAMERA_INFO);
 /// Boxes.
-pub const DETECTIONS: MessageType =
-    ("vision_msgs/msg/Detection2DArray", definition!("std_msgs/Header header\nDetection2D[] detections"));
+pub const DETECTIONS: MessageType = ("vision_msgs/msg/Detection2DArray", definitions::DETECTIONS);
 
 /// Content of a message, little-endian and aligned.
 #[derive(Debug, Default)]
@@ -130,7 +97,8 @@ pub fn pose_message(seconds: f64, frame: &str, at: &Se3) -> Vec<u8> {
 /// Returns an [`ODOMETRY`] message.
 pub fn odometry_message(seconds: f64, frame: &str, child: &str, at: &Se3) -> Vec<u8> {
     let cdr = pose(header(Cdr::new(), seconds, frame).string(child), at);
-    [0.0; 36].into_iter().fold(cdr, Cdr::f64).bytes()
+    // the covariance, and the velocity with its own
+    [0.0; 36 + 6 + 36].into_iter().fold(cdr, Cdr::f64).bytes()
 }
 
 /// Returns a [`TRANSFORMS`] message with one transform.
@@ -149,7 +117,9 @@ pub fn camera_message(
     let k = [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0];
     let r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
     let p = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
-    d.iter().copied().chain(k).chain(r).chain(p).fold(cdr, Cdr::f64).bytes()
+    let cdr = d.iter().copied().chain(k).chain(r).chain(p).fold(cdr, Cdr::f64);
+    // binning, and the region of interest
+    [0; 6].into_iter().fold(cdr, Cdr::u32).u8(0).bytes()
 }
 
 /// Returns a [`DETECTIONS`] message of boxes with sides xmin, ymin, xmax, ymax, a class and a score.
@@ -157,10 +127,49 @@ pub fn detections_message(seconds: f64, frame: &str, boxes: &[([f64; 4], &str, f
     let cdr = header(Cdr::new(), seconds, frame).u32(boxes.len() as u32);
     let add = |cdr: Cdr, ([xmin, ymin, xmax, ymax], class, score): &([f64; 4], &str, f64)| {
         let cdr = header(cdr, seconds, frame).u32(1).string(class).f64(*score);
+        // the pose of the object with its covariance
+        let cdr = [0.0; 7 + 36].into_iter().fold(cdr, Cdr::f64);
         let center = [0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 0.0];
         center.into_iter().chain([xmax - xmin, ymax - ymin]).fold(cdr, Cdr::f64).string("")
     };
     boxes.iter().fold(cdr, add).bytes()
+}
+
+/// Writes an SQLite file, with or without the definitions of types. Messages have a topic, a time in seconds, and a
+/// content.
+///
+/// # Panics
+/// If a message has an unknown topic, or the file cannot be written.
+pub fn database(
+    file: &Path,
+    topics: &[(&str, MessageType)],
+    messages: &[(&str, f64, Vec<u8>)],
+    with_definitions: bool,
+) {
+    let mut database = rusqlite::Connection::open(file).unwrap();
+    let tables = "CREATE TABLE topics (id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT);\
+                  CREATE TABLE messages (id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);\
+                  CREATE INDEX timestamp_idx ON messages (timestamp ASC);";
+    database.execute_batch(tables).unwrap();
+    if with_definitions {
+        let table = "CREATE TABLE message_definitions (id INTEGER PRIMARY KEY, topic_type TEXT, encoding TEXT, \
+                     encoded_message_definition TEXT)";
+        database.execute_batch(table).unwrap();
+    }
+    let all = database.transaction().unwrap();
+    for ((topic, (name, definition)), id) in topics.iter().zip(0_i64..) {
+        all.execute("INSERT INTO topics VALUES (?1, ?2, ?3, 'cdr')", (id, topic, name)).unwrap();
+        if with_definitions {
+            let insert = "INSERT INTO message_definitions VALUES (?1, ?2, 'ros2msg', ?3)";
+            all.execute(insert, (id, name, definition)).unwrap();
+        }
+    }
+    for (topic, seconds, data) in messages {
+        let id = topics.iter().position(|(name, _)| name == topic).unwrap() as i64;
+        let insert = "INSERT INTO messages (topic_id, timestamp, data) VALUES (?1, ?2, ?3)";
+        all.execute(insert, (id, (seconds * 1e9) as i64, data)).unwrap();
+    }
+    all.commit().unwrap();
 }
 
 /// Returns an MCAP file with compressed chunks. Messages have a topic, a time in seconds, and a content.

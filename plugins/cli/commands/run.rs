@@ -20,7 +20,7 @@ use std::path::PathBuf;
 
 /// Build, solve and evaluate the run that a document describes, and write the results.
 ///
-/// An MCAP recording of ROS 2 needs no document: its settings are guessed from its topics, and printed.
+/// A recording of ROS 2 (MCAP or SQLite) needs no document: its settings are guessed from its topics, and printed.
 ///
 /// Each variant of the run has a folder with its settings, trajectory, objects, frames, graph, iterations
 /// and metrics, the map as PLY, and pictures as SVG and PNG (the map from above and from the side, errors

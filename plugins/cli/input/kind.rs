@@ -3,6 +3,7 @@ use crate::failure::Failure;
 use crate::output::text::on_one_line;
 use manifactor::config::{Document, Value};
 use manifactor::formats::{GraphFormat, STDIN};
+use manifactor::slam::ros::is_recording;
 use std::path::Path;
 
 /// The kind of a file or folder, as far as its content shows it.
@@ -53,10 +54,10 @@ impl InputKind {
         }
     }
 
-    /// Returns the kind of a file that is no text; `None` for other extensions.
+    /// Returns the kind of a file that is no text, by its extension, or of a folder of such files; `None` for others.
     pub(crate) fn of_extension(path: &Path) -> Option<Self> {
-        let extension = path.extension()?.to_str()?;
-        ["mcap", "db3", "bag"].contains(&extension).then_some(Self::Mcap)
+        let is_of_ros_1 = path.extension().is_some_and(|extension| extension == "bag");
+        (is_of_ros_1 || is_recording(path)).then_some(Self::Mcap)
     }
 
     /// Returns the kind of a text that is no document; `None` if neither the extension of `path` nor the

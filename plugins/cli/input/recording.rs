@@ -95,6 +95,9 @@ fn further_cameras(contents: &Contents, first: &str) -> String {
 /// Returns the document of a run of a recording, and prints the guesses.
 pub(crate) fn document(path: &Path) -> Result<Document, Failure> {
     let contents = Contents::of(path)?;
+    // `.` has no name
+    let whole = path.canonicalize().ok().filter(|_| path.file_name().is_none());
+    let path = whole.as_deref().unwrap_or(path);
     let name = path.file_name().unwrap_or_default();
     let GuessedSource { source, is_level, .. } = guess(&contents, Path::new(name));
     let title = path.file_stem().unwrap_or_default().to_string_lossy();

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of all commands that read a run's document.
 #[derive(Debug, Args)]
 pub(crate) struct RunArguments {
-    /// The document that describes the run, or an MCAP recording, whose settings are guessed; `-` reads TOML or
+    /// The document that describes the run, or a recording of ROS 2, whose settings are guessed; `-` reads TOML or
     /// JSON from standard input.
     pub(crate) config: PathBuf,
     /// Set a value of the document, such as `solver.stop.max_iterations=50` or `source.seed=2`.

@@ -4,10 +4,11 @@ use crate::{fed, folder, manifactor, path};
 use manifactor::geometry::{Se3, So3};
 use manifactor::nalgebra::Vector3;
 use manifactor::slam::ros::testing::{
-    CAMERA_INFO, DETECTIONS, ODOMETRY, TRANSFORMS, camera_message, detections_message, odometry_message,
-    recording, transform_message,
+    CAMERA_INFO, DETECTIONS, MessageType, ODOMETRY, TRANSFORMS, camera_message, database, detections_message,
+    odometry_message, recording, transform_message,
 };
 use serde_json::Value;
+use std::path::Path;
 
 const CAMERA: &str = "camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
 
@@ -59,6 +60,19 @@ fn drive(frames: &[Value], base_from_camera: &Se3) -> Vec<u8> {
 
 /// Writes frames with a second camera, at a pose on the base.
 fn drive_with(frames: &[Value], base_from_camera: &Se3, base_from_rear: Option<&Se3>) -> Vec<u8> {
+    let (topics, messages) = messages(frames, base_from_camera, base_from_rear);
+    recording(&topics, messages.into_iter())
+}
+
+type Topics = Vec<(&'static str, MessageType)>;
+type Messages = Vec<(&'static str, f64, Vec<u8>)>;
+
+/// Returns the topics and messages of such a recording.
+fn messages(
+    frames: &[Value],
+    base_from_camera: &Se3,
+    base_from_rear: Option<&Se3>,
+) -> (Topics, Messages) {
     let camera_from_base = base_from_camera.inverse();
     let info =
         |frame| camera_message(frame, [320.0, 320.0, 320.0, 240.0], [640, 480], ("plumb_bob", &[0.0; 5]));
@@ -101,7 +115,7 @@ fn drive_with(frames: &[Value], base_from_camera: &Se3, base_from_rear: Option<&
         ("/rear/camera_info", CAMERA_INFO),
     ];
     let topics = if base_from_rear.is_some() { &topics[..] } else { &topics[..4] };
-    recording(topics, start.into_iter().chain(rear).chain(messages))
+    (topics.to_vec(), start.into_iter().chain(rear).chain(messages).collect())
 }
 
 /// Pose of a camera that looks ahead.
@@ -141,6 +155,18 @@ fn a_recording_of_ros_gives_the_map_of_its_frames() {
     let found = contents["source"].as_str().unwrap();
     let topics = r#"odometry = "/odom", detections = "/detections", camera_info = "/camera_info", up = [0.0, 0.0, 1.0] }"#;
     assert!(found.ends_with(topics), "{found}");
+    // the same in two files of SQLite, as ROS 2 Humble records them
+    let split = path(&folder, "split");
+    std::fs::create_dir(&split).unwrap();
+    let (topics_of_drive, messages) = messages(&frames, &base_from_camera, None);
+    for (i, part) in messages.chunks(messages.len() / 2 + 1).enumerate() {
+        database(Path::new(&format!("{split}/split_{i}.db3")), &topics_of_drive, part, false);
+    }
+    let of_split = manifactor(&format!("inspect {split} --json")).ended(0).json();
+    assert_eq!(of_split["topics"], contents["topics"]);
+    let lines_of = |bag: &str| manifactor(&format!("simulate {bag} --lines")).ended(0).stdout;
+    assert_eq!(lines_of(&split), lines_of(&bag));
+
     manifactor(&format!("solve {bag}")).ended(2).complains("`manifactor inspect");
     let guessed = manifactor(&format!("map {bag} --out {} --json", path(&folder, "guessed"))).ended(0);
     assert!(guessed.stderr.contains(topics), "{}", guessed.stderr);

@@ -11,11 +11,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-/// List the topics of an MCAP recording: types, rates and frames, and how a run can use them.
+/// List the topics of a recording of ROS 2: types, rates and frames, and how a run can use them.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  manifactor inspect drive.mcap")]
 pub(crate) struct Inspect {
-    /// The recording.
+    /// The recording: an MCAP or SQLite (db3) file, or a folder of such files.
     file: PathBuf,
     /// Print JSON.
     #[arg(long)]

@@ -27,7 +27,7 @@ mod recorded_messages;
 
 pub use error::McapError;
 
-/// A recording of a robot that runs ROS 2, as an MCAP file.
+/// A recording of a robot that runs ROS 2, in MCAP or SQLite (db3).
 ///
 /// It needs three topics: poses (`nav_msgs/Odometry`, `geometry_msgs/PoseStamped`,
 /// `geometry_msgs/PoseWithCovarianceStamped`, or transforms), boxes (`vision_msgs/Detection2DArray`), and the
@@ -41,7 +41,7 @@ pub use error::McapError;
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Mcap {
-    /// Path of the recording, relative to the document.
+    /// Path of the recording, relative to the document: a file, or a folder of files that are read by their number.
     pub file: PathBuf,
     /// Topic of the poses. Default: the only topic with a type of poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]

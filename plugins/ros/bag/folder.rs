@@ -1,0 +1,70 @@
+//! Recordings in several files of one folder.
+use super::BagError;
+use std::path::{Path, PathBuf};
+
+/// Extensions of recordings.
+const EXTENSIONS: [&str; 2] = ["mcap", "db3"];
+
+/// Returns whether a path is a recording by its extension, or a folder with such a file.
+pub fn is_recording(path: &Path) -> bool {
+    if path.is_dir() { files(path).is_ok() } else { has_extension(path) }
+}
+
+fn has_extension(path: &Path) -> bool {
+    path.extension().and_then(|extension| extension.to_str()).is_some_and(|own| EXTENSIONS.contains(&own))
+}
+
+/// Returns the files of a recording: the file itself, or those of a folder by the number at the end of their names.
+///
+/// # Errors
+/// If the folder cannot be read, or has no recording.
+pub(super) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let io = |source| BagError::Io { path: path.to_owned(), source };
+    let mut files = vec![];
+    for entry in std::fs::read_dir(path).map_err(io)? {
+        let file = entry.map_err(io)?.path();
+        if has_extension(&file) && file.is_file() {
+            files.push(file);
+        }
+    }
+    if files.is_empty() {
+        return Err(BagError::Format {
+            path: path.to_owned(),
+            found: "a folder without `.mcap` or `.db3` files; compressed ones need `zstd -d`",
+        });
+    }
+    files.sort_by_key(|file| (number(file), file.clone()));
+    Ok(files)
+}
+
+/// Returns the number at the end of a name, such as 12 in `drive_12.mcap`.
+fn number(file: &Path) -> u64 {
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    let digits = stem.rsplit(|c: char| !c.is_ascii_digit()).next().unwrap_or_default();
+    digits.parse().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_in_the_order_of_their_numbers() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["drive_10.mcap", "drive_9.mcap", "drive_0.mcap", "metadata.yaml"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let files = files(folder.path()).unwrap();
+        let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_str().unwrap()).collect();
+        assert_eq!(names, ["drive_0.mcap", "drive_9.mcap", "drive_10.mcap"]);
+        assert!(
+            is_recording(folder.path())
+                && is_recording(Path::new("a.db3"))
+                && !is_recording(Path::new("a.csv"))
+        );
+        assert!(!is_recording(tempfile::tempdir().unwrap().path()));
+    }
+}
