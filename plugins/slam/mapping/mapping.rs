@@ -12,7 +12,7 @@ use crate::settings::{DetectionSettings, OdometrySettings, RunSettings};
 use manifactor_formats::plausible;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::{Prior, Se3};
-use manifactor_graph::{FactorEntry, Graph, GraphError, Key, Manifold, Noise, Values, Variable};
+use manifactor_graph::{FactorEntry, Graph, GraphError, Key, Values, Variable};
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
 use manifactor_recording::camera::MountedCamera;
 use manifactor_recording::fusion::FusedClass;
@@ -21,7 +21,6 @@ use manifactor_recording::prior_map::PriorObject;
 use manifactor_recording::sequence::jumps::{OdometryJump, find_jumps};
 use manifactor_recording::sequence::{Frame, ObjectId, Sequence, UnusedInput};
 use serde::Serialize;
-use std::borrow::Cow;
 use std::sync::Arc;
 
 pub mod measurements;
@@ -430,25 +429,8 @@ pub fn motion_step<'a>(
     let OdometrySettings { noise, loss } = &settings.odometry;
     let (noise, name) =
         to.odometry_noise.as_deref().map_or((noise, None), |given| (given, Some(STEP_WITH_NOISE)));
-    // an estimated noise contains the errors of interpolation
-    let is_estimated =
-        name.is_none() && settings.variance_components.as_ref().is_some_and(|own| own.odometry);
-    let added = to.added_variance.filter(|_| !is_estimated).and_then(|added| with_variance(noise, added));
-    let noise = added.map_or(Cow::Borrowed(noise), Cow::Owned);
     let odometry = RelativePose { pose, noise, name, loss: loss.as_ref() };
     MotionStep { frames, seconds: to.timestamp - from.timestamp, odometry, estimates }
-}
-
-/// Returns the noise of a step with added variances of rotation and translation; `None` if it leaves rows out.
-fn with_variance(noise: &Noise, [rotation, translation]: [f64; 2]) -> Option<Noise> {
-    let information = noise.information_matrix(Se3::TANGENT.len()).ok()?;
-    let mut covariance = information.try_inverse()?;
-    for (row, variance) in
-        [rotation, rotation, rotation, translation, translation, translation].into_iter().enumerate()
-    {
-        covariance[(row, row)] += variance;
-    }
-    Noise::covariance(0.5 * (&covariance + covariance.transpose())).ok()
 }
 
 /// Returns warnings about jumps of the odometry: the corrected ones, and those that remain.

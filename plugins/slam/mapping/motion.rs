@@ -5,7 +5,6 @@
 use manifactor_geometry::Se3;
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Factor, FactorEntry, Key, Noise, Values, Variable};
-use std::borrow::Cow;
 use std::fmt::{self, Debug};
 use std::sync::Arc;
 
@@ -64,7 +63,7 @@ pub struct MotionError {
 }
 
 /// The step from one frame to the next.
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 pub struct MotionStep<'a> {
     /// Indices of both frames.
     pub frames: [usize; 2],
@@ -81,12 +80,12 @@ pub struct MotionStep<'a> {
 pub const STEP_WITH_NOISE: &str = "odometry with its own noise";
 
 /// A relative pose measured by odometry.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub struct RelativePose<'a> {
     /// Pose of the second camera in the frame of the first.
     pub pose: Se3,
     /// Noise of Log(Z⁻¹ Xᵢ⁻¹ Xⱼ): rad, then m.
-    pub noise: Cow<'a, Noise>,
+    pub noise: &'a Noise,
     /// Name of its factor: [`STEP_WITH_NOISE`] if the frame gives the noise.
     pub name: Option<&'static str>,
     /// Robust loss; `None` for a quadratic one.
@@ -96,9 +95,8 @@ pub struct RelativePose<'a> {
 impl MotionStep<'_> {
     /// Returns a factor of the odometry of this step, with its noise, its loss and its name.
     pub fn entry(&self, keys: Vec<Key>, factor: Arc<dyn Factor>) -> FactorEntry {
-        let RelativePose { noise, name, loss, .. } = &self.odometry;
-        let noise = noise.clone().into_owned();
-        FactorEntry { keys, name: name.map(Arc::from), factor, noise, loss: loss.cloned() }
+        let RelativePose { noise, name, loss, .. } = self.odometry;
+        FactorEntry { keys, name: name.map(Arc::from), factor, noise: noise.clone(), loss: loss.cloned() }
     }
 
     /// Returns the error of a model without a factor for this step.

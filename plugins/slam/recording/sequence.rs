@@ -210,15 +210,12 @@ pub struct Frame {
     /// Noise of the step from the previous frame, rotation before translation. Unit: rad, m. `None`: the noise
     /// of the settings.
     pub odometry_noise: Option<Arc<Noise>>,
-    /// Variances of rotation and translation, on each axis, that are added to the noise of this step, because poses were
-    /// interpolated. Unit: rad², m².
-    pub added_variance: Option<[f64; 2]>,
 }
 
 impl Frame {
     /// Creates a frame whose odometry has the noise of the settings.
     pub fn new(timestamp: f64, world_from_camera: Se3) -> Self {
-        Self { timestamp, world_from_camera, odometry_noise: None, added_variance: None }
+        Self { timestamp, world_from_camera, odometry_noise: None }
     }
 }
 

@@ -68,11 +68,7 @@ type Topics = Vec<(&'static str, MessageType)>;
 type Messages = Vec<(&'static str, f64, Vec<u8>)>;
 
 /// Returns the topics and messages of such a recording.
-fn messages(
-    frames: &[Value],
-    base_from_camera: &Se3,
-    base_from_rear: Option<&Se3>,
-) -> (Topics, Messages) {
+fn messages(frames: &[Value], base_from_camera: &Se3, base_from_rear: Option<&Se3>) -> (Topics, Messages) {
     let camera_from_base = base_from_camera.inverse();
     let info =
         |frame| camera_message(frame, [320.0, 320.0, 320.0, 240.0], [640, 480], ("plumb_bob", &[0.0; 5]));

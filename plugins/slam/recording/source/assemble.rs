@@ -1,5 +1,5 @@
 //! Frames and detections, matched by time.
-use super::interpolation::interpolated_frames;
+use super::interpolation::pose_at;
 use super::{DetectionsFile, SourceError};
 use crate::camera::MountedCamera;
 use crate::measurement::{DepthMeasurement, Quantities};
@@ -81,18 +81,14 @@ pub(super) fn read_matched(
 /// Detections that all lack a frame.
 pub(super) fn match_by_time(
     poses: &[StampedPose],
-    mut images: Vec<f64>,
+    images: Vec<f64>,
     rows: Vec<(f64, Detection)>,
     by: TimeMatching,
     from: [&Path; 2],
 ) -> Result<MatchedDetections, SourceError> {
     let within = *by.within;
     let frames: Vec<Frame> = match by.max_pose_gap {
-        Some(gap) => {
-            images.sort_by(f64::total_cmp);
-            images.dedup();
-            interpolated_frames(poses, images, gap.get())
-        }
+        Some(gap) => interpolated_frames(poses, images, gap.get()),
         None => poses.iter().map(|pose| Frame::new(pose.timestamp, pose.pose)).collect(),
     };
     let times: Vec<f64> = frames.iter().map(|frame| frame.timestamp).collect();
@@ -124,6 +120,14 @@ pub(super) fn match_by_time(
     // stable, so that the order of the file decides between duplicates
     matched.sort_by_key(|detection| detection.frame);
     Ok((frames, matched, without.map(UnusedInput::WithoutPose).into_iter().collect()))
+}
+
+/// Returns a frame for each image that lies between two poses.
+fn interpolated_frames(poses: &[StampedPose], mut images: Vec<f64>, max_gap: f64) -> Vec<Frame> {
+    images.sort_by(f64::total_cmp);
+    images.dedup();
+    let frame = |timestamp: f64| Some(Frame::new(timestamp, pose_at(poses, timestamp, max_gap).ok()?));
+    images.into_iter().filter_map(frame).collect()
 }
 
 /// Returns a summary of the rows without a frame; `None` if there are none.

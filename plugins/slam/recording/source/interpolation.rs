@@ -5,10 +5,11 @@ use super::SourceError;
 use crate::sequence::pose_graph::PoseGraphChanges;
 use crate::sequence::{Acceleration, Frame, Observation, UnusedInput};
 use manifactor_formats::tum::StampedPose;
+use manifactor_geometry::Se3;
 use manifactor_graph::Manifold;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use steps::{GivenNoise, GivenSteps, InterpolatedPose};
+use steps::{GivenNoise, GivenSteps};
 
 /// Reason why an image has no pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,33 +30,18 @@ const TIME_ROUNDING_S: f64 = 2e-6;
 ///
 /// # Errors
 /// If there are no such neighbours.
-fn pose_at(poses: &[StampedPose], timestamp: f64, max_gap: f64) -> Result<InterpolatedPose, NoPose> {
+pub(super) fn pose_at(poses: &[StampedPose], timestamp: f64, max_gap: f64) -> Result<Se3, NoPose> {
     let after = poses.partition_point(|pose| pose.timestamp < timestamp);
     let to = poses.get(after).ok_or(NoPose::After)?;
     if to.timestamp == timestamp {
-        return Ok(InterpolatedPose::at(to));
+        return Ok(to.pose);
     }
     let from = after.checked_sub(1).and_then(|before| poses.get(before)).ok_or(NoPose::Before)?;
     let gap = to.timestamp - from.timestamp;
     if gap > max_gap + TIME_ROUNDING_S {
         return Err(NoPose::Gap(gap));
     }
-    InterpolatedPose::between(&poses[..=after], timestamp).ok_or(NoPose::Before)
-}
-
-/// Returns a frame for each image that lies between two poses. Both are sorted by time.
-pub(super) fn interpolated_frames(
-    poses: &[StampedPose],
-    images: impl IntoIterator<Item = f64>,
-    max_gap: f64,
-) -> Vec<Frame> {
-    let mut before = None;
-    let frame = |timestamp: f64| {
-        let found = pose_at(poses, timestamp, max_gap).ok()?;
-        let added_variance = found.added_variance(before.replace(found).as_ref());
-        Some(Frame { added_variance, ..Frame::new(timestamp, found.pose) })
-    };
-    images.into_iter().filter_map(frame).collect()
+    Ok(from.interpolate(to, timestamp))
 }
 
 /// A pose, an image, or both, as they arrive.
@@ -80,8 +66,8 @@ pub(super) struct InterpolatedFrames<I> {
     /// Images that wait for a pose, sorted by time.
     images: Vec<Observation>,
     given: GivenSteps,
-    /// The pose of the last image that was released.
-    last: Option<InterpolatedPose>,
+    /// Timestamp of the last image that was released.
+    last: Option<f64>,
     /// Data of poses without an image, for the next frame.
     accelerometer: Vec<Acceleration>,
     pose_graph: PoseGraphChanges,
@@ -156,13 +142,12 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
     }
 
     /// Sets the pose of an image, and the noise of the step from the image before.
-    fn set_pose(&mut self, image: &mut Observation, pose: InterpolatedPose) {
+    fn set_pose(&mut self, image: &mut Observation, pose: Se3) {
         let frame = &mut image.frame;
         let timestamp = frame.timestamp;
-        frame.world_from_camera = pose.pose;
-        frame.added_variance = pose.added_variance(self.last.as_ref());
-        let from = self.last.map_or(f64::NEG_INFINITY, |last| last.timestamp());
-        let given = self.given.take(from, &StampedPose { timestamp, pose: pose.pose });
+        frame.world_from_camera = pose;
+        let from = self.last.unwrap_or(f64::NEG_INFINITY);
+        let given = self.given.take(from, &StampedPose { timestamp, pose });
         match given {
             GivenNoise::Whole(noise) => frame.odometry_noise = Some(Arc::new(noise)),
             GivenNoise::Partial if self.last.is_some() => {
@@ -175,7 +160,7 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
             }
             GivenNoise::None | GivenNoise::Partial => {}
         }
-        self.last = Some(pose);
+        self.last = Some(timestamp);
     }
 
     /// Keeps the data of a line that becomes no frame.
@@ -189,7 +174,7 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
     /// Moves the poses so far to the corrected odometry frame of the next ones.
     fn correct_poses(&mut self, corrected: &[StampedPose]) {
         let correction = |corrected: &StampedPose| {
-            let before = pose_at(&self.poses, corrected.timestamp, self.max_gap).ok()?.pose;
+            let before = pose_at(&self.poses, corrected.timestamp, self.max_gap).ok()?;
             Some((corrected.timestamp, corrected.pose.compose(&before.inverse())))
         };
         let newest = corrected.iter().filter_map(correction).max_by(|a, b| a.0.total_cmp(&b.0));
@@ -263,7 +248,7 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> Iterator for Interpol
 #[cfg(test)]
 mod tests {
     use super::*;
-    use manifactor_geometry::{Se3, So3};
+    use manifactor_geometry::So3;
     use manifactor_graph::Noise;
     use nalgebra::{Vector3, Vector6};
 
@@ -275,7 +260,7 @@ mod tests {
     fn a_constant_twist_is_interpolated_exactly() {
         let poses = [1.0, 1.2, 1.4].map(stamped);
         for timestamp in [1.0, 1.07, 1.2, 1.33, 1.4] {
-            let found = pose_at(&poses, timestamp, 0.25).unwrap().pose;
+            let found = pose_at(&poses, timestamp, 0.25).unwrap();
             assert!(stamped(timestamp).pose.local(&found).norm() < 1e-12, "{timestamp}");
         }
         assert!(matches!(pose_at(&poses, 0.9, 0.25), Err(NoPose::Before)));

@@ -1,102 +1,12 @@
-//! Noise of the steps between images whose poses are interpolated: that of the odometry, as far as the source gives it,
-//! and the error of interpolation.
+//! Noise of the odometry between images whose poses are interpolated, if the source gives the noise of its poses.
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Manifold, Noise};
-use nalgebra::{DMatrix, Matrix6, Vector6};
+use nalgebra::{DMatrix, Matrix6};
 use std::collections::VecDeque;
 
-/// Largest number of poses whose changes of velocity give the noise of the acceleration.
-const POSES: usize = 20;
-/// Largest age of these poses, in seconds.
-const MAX_AGE_S: f64 = 5.0;
 /// Largest number of steps that wait for an image; older ones are joined.
 const MAX_STEPS: usize = 1000;
-
-/// A pose between two poses, with the error of interpolation.
-///
-/// The model of the motion is a constant twist with white noise on its derivative, the acceleration. Given the poses at
-/// both ends of a gap T, and nothing about the velocities, the errors at the times s ≤ t after its start have the
-/// covariance q s (T - t)(2Tt - t² - s²) / (6T), with the spectral density q of the noise. This is the kernel of the
-/// natural cubic spline (Wahba, *Spline Models for Observational Data*, 1990).
-#[derive(Debug, Clone, Copy)]
-pub(super) struct InterpolatedPose {
-    pub pose: Se3,
-    timestamp: f64,
-    /// Timestamps of the poses around it, in seconds.
-    gap: [f64; 2],
-    /// Spectral densities of the angular and the linear acceleration, in rad²/s³ and m²/s³.
-    densities: [f64; 2],
-}
-
-impl InterpolatedPose {
-    /// Returns a pose without an error.
-    pub(super) fn at(pose: &StampedPose) -> Self {
-        let StampedPose { timestamp, pose } = *pose;
-        Self { pose, timestamp, gap: [timestamp; 2], densities: [0.0; 2] }
-    }
-
-    /// Returns the timestamp, in seconds.
-    pub(super) fn timestamp(&self) -> f64 {
-        self.timestamp
-    }
-
-    /// Interpolates between the last two of `poses`, which ascend in time. The others give the noise of the
-    /// acceleration.
-    pub(super) fn between(poses: &[StampedPose], timestamp: f64) -> Option<Self> {
-        let [.., from, to] = poses else { return None };
-        Some(Self {
-            pose: from.interpolate(to, timestamp),
-            timestamp,
-            gap: [from.timestamp, to.timestamp],
-            densities: densities(poses),
-        })
-    }
-
-    /// Returns the variances of rotation and translation, on each axis, that interpolation adds to the step from the image
-    /// before. Unit: rad², m². `None` if it adds nothing.
-    pub(super) fn added_variance(&self, before: Option<&Self>) -> Option<[f64; 2]> {
-        let own = self.error_with(self);
-        let of = |i: usize| {
-            let before = before.map_or(0.0, |before| {
-                before.densities[i] * before.error_with(before)
-                    - 2.0 * self.densities[i] * before.error_with(self)
-            });
-            (self.densities[i] * own + before).max(0.0)
-        };
-        let variances = [of(0), of(1)];
-        variances.iter().any(|variance| *variance > 0.0).then_some(variances)
-    }
-
-    /// Returns the covariance of the errors of two poses for a spectral density of one; zero in different gaps.
-    fn error_with(&self, later: &Self) -> f64 {
-        let [start, end] = self.gap;
-        let (gap, s, t) = (end - start, self.timestamp - start, later.timestamp - start);
-        if self.gap != later.gap || gap <= 0.0 {
-            return 0.0;
-        }
-        s * (gap - t) * (2.0 * gap * t - t * t - s * s) / (6.0 * gap)
-    }
-}
-
-/// Returns the spectral densities of the angular and the linear acceleration. The mean velocities in two consecutive gaps
-/// T₁ and T₂ differ by a variance of q (T₁ + T₂) / 3 on each axis.
-fn densities(poses: &[StampedPose]) -> [f64; 2] {
-    let recent = &poses[poses.len().saturating_sub(POSES)..];
-    let newest = poses.last().map_or(0.0, |last| last.timestamp);
-    let recent = recent.iter().skip_while(|pose| pose.timestamp < newest - MAX_AGE_S).collect::<Vec<_>>();
-    let (mut squares, mut seconds) = ([0.0; 2], 0.0);
-    for three in recent.windows(3) {
-        let velocity = |i: usize| {
-            three[i].pose.local(&three[i + 1].pose) / (three[i + 1].timestamp - three[i].timestamp)
-        };
-        let change: Vector6<f64> = velocity(1) - velocity(0);
-        squares[0] += change.fixed_rows::<3>(0).norm_squared();
-        squares[1] += change.fixed_rows::<3>(3).norm_squared();
-        seconds += three[2].timestamp - three[0].timestamp;
-    }
-    if seconds > 0.0 { squares.map(|squares| squares / seconds) } else { [0.0; 2] }
-}
 
 /// Noise of the odometry between consecutive poses, as the source gives it.
 #[derive(Debug, Default)]
@@ -186,61 +96,9 @@ mod tests {
     use super::*;
     use manifactor_geometry::So3;
     use nalgebra::Vector3;
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use rand_pcg::Pcg64;
 
     fn at(timestamp: f64, x: f64) -> StampedPose {
         StampedPose { timestamp, pose: Se3::new(So3::identity(), Vector3::new(x, 0.0, 0.0)) }
-    }
-
-    #[test]
-    fn a_constant_twist_adds_no_noise() {
-        let poses: Vec<StampedPose> = (0..9)
-            .map(|i| f64::from(i) * 0.1)
-            .map(|t| StampedPose {
-                timestamp: t,
-                pose: Se3::exp(&(Vector6::new(0.1, 0.2, -0.1, 1.0, 0.5, 0.0) * t)),
-            })
-            .collect();
-        let found = InterpolatedPose::between(&poses, 0.75).unwrap();
-        assert!(
-            found.added_variance(None).is_none_or(|added| added.iter().all(|variance| *variance < 1e-25))
-        );
-    }
-
-    /// Integrates white noise on the acceleration, and compares poses that are interpolated over a gap with the true ones.
-    #[test]
-    fn the_error_of_interpolation_has_the_predicted_variance() {
-        let (density, step, gap) = (0.04, 0.01, 40);
-        let mut random = Pcg64::seed_from_u64(7);
-        let (mut x, mut v, mut path) = (0.0, 0.0, vec![]);
-        for i in 0..80_000_u32 {
-            path.push(at(f64::from(i) * step, x));
-            // exact for piecewise constant acceleration
-            let deviate: f64 = StandardNormal.sample(&mut random);
-            let a = deviate * (density / step).sqrt();
-            x += step * v + 0.5 * step * step * a;
-            v += step * a;
-        }
-        let (mut squares, mut predicted, mut count) = ([0.0; 2], [0.0; 2], 0.0);
-        let kept: Vec<StampedPose> = path.iter().step_by(gap).copied().collect();
-        for i in 30..kept.len() - 1 {
-            let [first, second] = [10, 25].map(|k| &path[i * gap + k]);
-            let poses = &kept[..i + 2];
-            let of = |truth: &StampedPose| InterpolatedPose::between(poses, truth.timestamp).unwrap();
-            let error = |truth: &StampedPose| of(truth).pose.translation.x - truth.pose.translation.x;
-            squares[0] += error(first).powi(2);
-            squares[1] += (error(second) - error(first)).powi(2);
-            predicted[0] += of(first).added_variance(None).unwrap()[1];
-            predicted[1] += of(second).added_variance(Some(&of(first))).unwrap()[1];
-            count += 1.0;
-        }
-        for (squares, predicted) in squares.iter().zip(predicted) {
-            // the motion is along one of three axes
-            let ratio = squares / (3.0 * predicted);
-            assert!((0.85..1.15).contains(&ratio), "{ratio} in {count} gaps");
-        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::sequence::{Acceleration, ClassScores, Detection, Frame, ObjectId, Obs
 use indexmap::IndexMap;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
-use manifactor_graph::checked::{NotNegative, Share};
+use manifactor_graph::checked::Share;
 use manifactor_graph::{Manifold, Noise};
 use manifactor_quadric::BoundingBox;
 use nalgebra::Vector3;
@@ -42,10 +42,6 @@ pub struct FrameLine {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Noise>")]
     odometry_noise: Option<Value>,
-    /// Variances of rotation and translation, on each axis, that are added to the noise of this step, for example because
-    /// the pose was interpolated. Unit: rad², m².
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    added_variance: Option<[NotNegative; 2]>,
     /// New factors on poses.
     #[serde(default, skip_serializing_if = "is_empty")]
     #[schemars(with = "Vec<PoseFactor>")]
@@ -162,9 +158,6 @@ pub fn format_line(observation: &Observation) -> String {
             .odometry_noise
             .as_deref()
             .and_then(|n| serde_json::to_value(n).ok()),
-        added_variance: observation.frame.added_variance.and_then(|[rotation, translation]| {
-            Some([NotNegative::new(rotation).ok()?, NotNegative::new(translation).ok()?])
-        }),
         factors: values_of(&observation.pose_graph.factors).into(),
         removed: values_of(&observation.pose_graph.removed).into(),
         corrected: values_of(observation.pose_graph.corrected.iter().map(of_pose)).into(),
@@ -223,17 +216,8 @@ pub(super) fn parse_line(line: &[u8], cameras: &Cameras) -> Result<PoseOrImage, 
         Some(text) => serde_json::from_str(&text),
         None => Err(error),
     });
-    let FrameLine {
-        timestamp,
-        pose,
-        boxes,
-        accelerometer,
-        odometry_noise,
-        added_variance,
-        factors,
-        removed,
-        corrected,
-    } = read.map_err(|error: serde_json::Error| error.to_string())?;
+    let FrameLine { timestamp, pose, boxes, accelerometer, odometry_noise, factors, removed, corrected } =
+        read.map_err(|error: serde_json::Error| error.to_string())?;
     let (mut detections, mut unused) = (vec![], vec![]);
     let (has_pose, is_image) = (pose.is_some(), boxes.is_some());
     for (place, value) in boxes.unwrap_or_default().into_iter().enumerate() {
@@ -243,7 +227,6 @@ pub(super) fn parse_line(line: &[u8], cameras: &Cameras) -> Result<PoseOrImage, 
         }
     }
     let mut frame = Frame::new(timestamp, pose.unwrap_or_else(Se3::identity));
-    frame.added_variance = added_variance.map(|added| added.map(NotNegative::get));
     match odometry_noise.map(read_noise).transpose() {
         Ok(noise) => frame.odometry_noise = noise,
         Err(fault) => {
