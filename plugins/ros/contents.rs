@@ -1,6 +1,6 @@
 //! Contents of a recording: its topics, and what they can be used for.
 use crate::bag::{BagError, Ending, read};
-use crate::messages::{CAMERA_TYPE, DETECTION_TYPE, Header, POSE_TYPES, TRANSFORM_TYPE};
+use crate::messages::{CAMERA_TYPE, DETECTION_TYPE, Header, IMU_TYPE, POSE_TYPES, TRANSFORM_TYPE};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -46,6 +46,8 @@ pub enum Role {
     Detections,
     /// Calibration of the camera.
     CameraInfo,
+    /// Accelerations.
+    Imu,
     /// Transforms between frames.
     Transforms,
 }
@@ -56,6 +58,7 @@ impl Role {
         match message_type {
             DETECTION_TYPE => Some(Self::Detections),
             CAMERA_TYPE => Some(Self::CameraInfo),
+            IMU_TYPE => Some(Self::Imu),
             TRANSFORM_TYPE => Some(Self::Transforms),
             other => POSE_TYPES.contains(&other).then_some(Self::Odometry),
         }
@@ -67,6 +70,7 @@ impl Role {
             Self::Odometry => &POSE_TYPES,
             Self::Detections => &[DETECTION_TYPE],
             Self::CameraInfo => &[CAMERA_TYPE],
+            Self::Imu => &[IMU_TYPE],
             Self::Transforms => &[TRANSFORM_TYPE],
         }
     }

@@ -43,6 +43,12 @@ pub(crate) const CAMERA_INFO: &str = definition!(
     "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p\n\
      uint32 binning_x\nuint32 binning_y\nsensor_msgs/RegionOfInterest roi"
 );
+/// `sensor_msgs/msg/Imu`.
+pub(crate) const IMU: &str = definition!(
+    "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n\
+     geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n\
+     geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance"
+);
 /// `vision_msgs/msg/Detection2DArray` of ROS 2 Humble and later.
 pub(crate) const DETECTIONS: &str = definition!("std_msgs/Header header\nDetection2D[] detections");
 
@@ -54,6 +60,7 @@ pub(crate) fn of(message_type: &str) -> Option<&'static str> {
         "nav_msgs/msg/Odometry" => ODOMETRY,
         "tf2_msgs/msg/TFMessage" => TRANSFORMS,
         "sensor_msgs/msg/CameraInfo" => CAMERA_INFO,
+        "sensor_msgs/msg/Imu" => IMU,
         "vision_msgs/msg/Detection2DArray" => DETECTIONS,
         _ => return None,
     })

@@ -128,6 +128,8 @@ pub const POSE_TYPES: [&str; 3] =
     ["nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped"];
 /// Type of messages with transforms between frames.
 pub const TRANSFORM_TYPE: &str = "tf2_msgs/msg/TFMessage";
+/// Type of messages of an IMU.
+pub const IMU_TYPE: &str = "sensor_msgs/msg/Imu";
 /// Type of messages with boxes.
 pub const DETECTION_TYPE: &str = "vision_msgs/msg/Detection2DArray";
 /// Type of messages with the calibration of a camera.
@@ -182,6 +184,33 @@ pub struct CameraInfo {
     pub k: Vec<f64>,
     /// Projection matrix of the rectified image, by rows: 3 × 4.
     pub p: Vec<f64>,
+}
+
+/// `sensor_msgs/msg/Imu`, without the orientation.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Imu {
+    /// Time, and name of the frame of the sensor.
+    pub header: Header,
+    linear_acceleration: Coordinates,
+    #[serde(default)]
+    linear_acceleration_covariance: Vec<f64>,
+}
+
+impl Imu {
+    /// Returns the specific force in the frame of the sensor, which points up at rest. Unit: m/s².
+    ///
+    /// # Errors
+    /// If the sensor has no accelerometer, or the numbers are not finite.
+    pub fn acceleration(&self) -> Result<Vector3<f64>, &'static str> {
+        let Coordinates { x, y, z } = self.linear_acceleration;
+        // by the definition of the message
+        if self.linear_acceleration_covariance.first() == Some(&-1.0) {
+            return Err("the covariance of the acceleration begins with -1: the sensor has no accelerometer");
+        }
+        let acceleration = Vector3::new(x, y, z);
+        let is_finite = acceleration.iter().all(|x| x.is_finite());
+        is_finite.then_some(acceleration).ok_or("the acceleration is not finite")
+    }
 }
 
 /// `vision_msgs/msg/Detection2DArray`.

@@ -21,6 +21,8 @@ pub const ODOMETRY: MessageType = ("nav_msgs/msg/Odometry", definitions::ODOMETR
 pub const TRANSFORMS: MessageType = ("tf2_msgs/msg/TFMessage", definitions::TRANSFORMS);
 /// Calibration of a camera.
 pub const CAMERA_INFO: MessageType = ("sensor_msgs/msg/CameraInfo", definitions::CAMERA_INFO);
+/// Accelerations.
+pub const IMU: MessageType = ("sensor_msgs/msg/Imu", definitions::IMU);
 /// Boxes.
 pub const DETECTIONS: MessageType = ("vision_msgs/msg/Detection2DArray", definitions::DETECTIONS);
 
@@ -104,6 +106,14 @@ pub fn odometry_message(seconds: f64, frame: &str, child: &str, at: &Se3) -> Vec
 /// Returns a [`TRANSFORMS`] message with one transform.
 pub fn transform_message(seconds: f64, parent: &str, child: &str, at: &Se3) -> Vec<u8> {
     pose(header(Cdr::new().u32(1), seconds, parent).string(child), at).bytes()
+}
+
+/// Returns an [`IMU`] message with an acceleration.
+pub fn imu_message(seconds: f64, frame: &str, acceleration: [f64; 3]) -> Vec<u8> {
+    let cdr = header(Cdr::new(), seconds, frame);
+    // orientation and angular velocity with their covariances
+    let cdr = [0.0; 4 + 9 + 3 + 9].into_iter().fold(cdr, Cdr::f64);
+    acceleration.into_iter().chain([0.0; 9]).fold(cdr, Cdr::f64).bytes()
 }
 
 /// Returns a [`CAMERA_INFO`] message of a camera with fx, fy, cx, cy, its width and height, and its distortion.

@@ -313,6 +313,7 @@ fn unused_warnings<'a>(all: impl Iterator<Item = &'a UnusedInput>, without_area:
             UnusedInput::WithoutPose(without) => {
                 warnings.push(Warning::Unused { what: without.to_string() });
             }
+            UnusedInput::Recording(what) => warnings.push(Warning::Unused { what: what.clone() }),
             UnusedInput::Box { timestamp, place, fault } => {
                 boxes += 1;
                 first.get_or_insert_with(|| format!("box {place} at {timestamp} s: {fault}"));

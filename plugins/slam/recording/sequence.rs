@@ -69,6 +69,8 @@ pub enum UnusedInput {
         /// The fault, with the time and the remedy.
         fault: String,
     },
+    /// Other data of a recording: their number, the fault, and the remedy.
+    Recording(String),
     /// A change of the pose graph, or the noise of the odometry, that cannot be read or applied.
     PoseGraph {
         /// Timestamp of its frame. Unit: seconds.

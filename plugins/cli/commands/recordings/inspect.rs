@@ -45,7 +45,11 @@ impl Inspect {
         for (name, topic) in &contents.topics {
             let role =
                 ROLES.iter().find(|(role, ..)| Some(*role) == topic.role).map(|(_, setting, _)| *setting);
-            let role = role.or((topic.role == Some(Role::Transforms)).then_some("transforms"));
+            let role = role.or(match topic.role {
+                Some(Role::Transforms) => Some("transforms"),
+                Some(Role::Imu) => Some("imu"),
+                _ => None,
+            });
             table.row([
                 name.clone(),
                 topic.messages.to_string(),

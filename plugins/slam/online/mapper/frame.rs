@@ -177,7 +177,7 @@ impl Mapper {
         report.refused.extend(observation.unused.iter().filter_map(|unused| match unused {
             UnusedInput::Box { place, fault, .. } => Some(format!("box {place} is left out: {fault}")),
             UnusedInput::PoseGraph { field, fault, .. } => Some(format!("{field} is left out: {fault}")),
-            UnusedInput::WithoutPose(_) | UnusedInput::Image { .. } => None,
+            UnusedInput::WithoutPose(_) | UnusedInput::Image { .. } | UnusedInput::Recording(_) => None,
         }));
         self.smoother.set_time(timestamp)?;
         self.smoother.push(&graph, &values)?;

@@ -7,7 +7,7 @@ use super::rectification::Rectification;
 use super::rig::Rig;
 use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
 use crate::camera::{Cameras, MountedCamera};
-use crate::sequence::{ClassScores, Detection, Sequence, UnusedInput};
+use crate::sequence::{Acceleration, ClassScores, Detection, Sequence, UnusedInput};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
@@ -57,6 +57,10 @@ pub struct Mcap {
     /// the boxes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_info: Option<String>,
+    /// Topic of an IMU, for `gravity = { type = "accelerometer" }`; its readings are turned to the camera frame.
+    /// Default: the only topic of its type.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub imu: Option<String>,
     /// The camera in place of a topic.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraChoice>,
@@ -130,9 +134,10 @@ impl SequenceSource for Mcap {
             Some(truth) => read_ground_truth(&folders.document, Some(truth))?,
             None => None,
         };
-        let messages = RecordedMessages::read(self, &file)?;
+        let mut messages = RecordedMessages::read(self, &file)?;
         let lens = self.lens(&file, self.camera.as_ref(), messages.calibrations.first(), folders)?;
-        let (poses, body_from_camera) = self.camera_poses(&file, &messages)?;
+        let (poses, body_from_camera) = self.camera_poses(&file, &mut messages)?;
+        let accelerometer = self.accelerometer(&file, &mut messages, body_from_camera)?;
         if let (Some(pose), Some(truth)) = (body_from_camera, &mut ground_truth) {
             Extrinsics::new(pose).apply_to_ground_truth(truth);
         }
@@ -158,13 +163,14 @@ impl SequenceSource for Mcap {
             match_by_time(&poses, images, rows, by, from)?;
         rig.apply(&mut detections)?;
         unused.extend(without);
+        unused.extend(messages.unused.into_iter().map(UnusedInput::Recording));
         Ok(Sequence {
             cameras: rig.cameras,
             body_from_camera,
             frames,
             detections,
             up: self.up,
-            accelerometer: vec![],
+            accelerometer,
             ground_truth,
             pose_factors: vec![],
             corrected_jumps: vec![],
@@ -313,10 +319,10 @@ impl Mcap {
     fn camera_poses(
         &self,
         file: &Path,
-        messages: &RecordedMessages,
+        messages: &mut RecordedMessages,
     ) -> Result<(Vec<StampedPose>, Option<Se3>), McapError> {
         let no_transform = |source| McapError::NoTransform { file: file.to_owned(), source };
-        let mut poses = messages.poses.clone();
+        let mut poses = std::mem::take(&mut messages.poses);
         if let Some(pose) = self.body_from_camera {
             poses.iter_mut().for_each(|stamped| Extrinsics::new(pose).apply_to_pose(&mut stamped.pose));
             return Ok((poses, Some(pose)));
@@ -353,10 +359,48 @@ impl Mcap {
             Some(source) if poses.is_empty() => Err(no_transform(source)),
             Some(error) => {
                 let left_out = count - poses.len();
-                tracing::warn!("{}: {left_out} of {count} poses are left out: {error}", file.display());
+                messages.unused.push(format!("{left_out} of {count} poses are left out: {error}"));
                 Ok((poses, None))
             }
             None => Ok((poses, None)),
+        }
+    }
+
+    /// Returns the readings of the accelerometer in the camera frame. Readings of a topic that the document does not name
+    /// are left out if their frame is not known.
+    fn accelerometer(
+        &self,
+        file: &Path,
+        messages: &mut RecordedMessages,
+        body_from_camera: Option<Se3>,
+    ) -> Result<Vec<Acceleration>, McapError> {
+        let Some(sensor) = messages.imu_frame.clone() else { return Ok(vec![]) };
+        let rotation = || match (self.body_from_camera, messages.camera_frame.as_deref()) {
+            (None, Some(camera)) => messages.transforms.pose(camera, &sensor, 0.0),
+            _ => {
+                let body = self.body_frame.as_deref().or(messages.body_frame.as_deref()).unwrap_or(&sensor);
+                let body_from_sensor = messages.transforms.pose(body, &sensor, 0.0)?;
+                Ok(body_from_camera
+                    .map_or(body_from_sensor, |camera| camera.inverse().compose(&body_from_sensor)))
+            }
+        };
+        match rotation() {
+            Ok(camera_from_sensor) => {
+                let mut readings = std::mem::take(&mut messages.accelerometer);
+                for reading in &mut readings {
+                    reading.acceleration = camera_from_sensor.rotation.act(&reading.acceleration);
+                }
+                readings.sort_by(|a, b| a.timestamp.total_cmp(&b.timestamp));
+                Ok(readings)
+            }
+            Err(fault) if self.imu.is_some() => {
+                Err(McapError::NoImuTransform { file: file.to_owned(), fault: fault.to_string().into() })
+            }
+            Err(fault) => {
+                let count = messages.accelerometer.len();
+                messages.unused.push(format!("{count} readings of the accelerometer are left out: {fault}"));
+                Ok(vec![])
+            }
         }
     }
 

@@ -76,6 +76,14 @@ pub enum McapError {
         /// The reason.
         source: TransformError,
     },
+    /// The orientation of the IMU is not known.
+    #[error("{}: the orientation of the IMU is not known: {fault}; leave `source.imu` out, or record the transform", file.display())]
+    NoImuTransform {
+        /// The recording.
+        file: PathBuf,
+        /// The reason.
+        fault: Box<str>,
+    },
     /// A further camera shares its topic of boxes, but does not say which frame is its own.
     #[error("{}: `source.cameras.{camera}` shares the topic `{topic}` with another camera: set its `camera_frame`", file.display())]
     SharedTopic {

@@ -1,8 +1,9 @@
 //! Messages of a recording that a sequence is made of.
 use super::{CameraChoice, FurtherMcapCamera, Mcap, McapError};
+use crate::sequence::Acceleration;
 use manifactor_formats::tum::StampedPose;
 use manifactor_graph::Manifold;
-use manifactor_ros::messages::{CameraInfo, Detection2D, Detection2DArray, FramedPose, TransformList};
+use manifactor_ros::messages::{CameraInfo, Detection2D, Detection2DArray, FramedPose, Imu, TransformList};
 use manifactor_ros::{BagMessage, Contents, DecodeError, Ending, Role, Transforms, read};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -54,6 +55,13 @@ pub(super) struct RecordedMessages {
     /// Calibration of each camera.
     pub calibrations: Vec<Calibration>,
     pub transforms: Transforms,
+    /// Readings in the frame of the IMU.
+    pub accelerometer: Vec<Acceleration>,
+    /// Frame of the IMU, if there are readings.
+    pub imu_frame: Option<String>,
+    imu_topic: Option<String>,
+    /// What is left out, with the number and the reason.
+    pub unused: Vec<String>,
 }
 
 /// Messages that cannot be used, by topic: their number, and the first fault.
@@ -67,7 +75,7 @@ impl UnusedMessages {
 }
 
 impl RecordedMessages {
-    /// Reads the messages. Messages that cannot be used are counted and logged.
+    /// Reads the messages. Messages that cannot be used are counted.
     ///
     /// # Errors
     /// If the file cannot be read, or lacks something that is needed.
@@ -123,6 +131,11 @@ impl RecordedMessages {
             source.cameras.values().map(|further| further.detections.as_str()).collect();
         let mut found =
             Self { odometry_topic: odometry, detections_topic: detections, calibrations, ..Self::default() };
+        found.imu_topic = match (&source.imu, &contents.with_role(Role::Imu)[..]) {
+            (None, [(only, _)]) => Some((*only).to_owned()),
+            (None, _) => None,
+            (named, _) => Some(source.topic(file, &contents, Role::Imu, ("imu", named.as_ref()), "")?),
+        };
         let mut unused = UnusedMessages::default();
         let ending = read(file, |message| {
             let name = &message.topic.name;
@@ -133,6 +146,8 @@ impl RecordedMessages {
                 found.add_pose(&message)
             } else if *name == found.detections_topic || further_topics.contains(&name.as_str()) {
                 found.add_boxes(&message)
+            } else if found.imu_topic.as_ref() == Some(name) {
+                found.add_acceleration(&message)
             } else {
                 found.add_calibration(&message)
             };
@@ -141,12 +156,12 @@ impl RecordedMessages {
             }
         })?;
         if let Ending::Fault(fault) = ending {
-            tracing::warn!("{}: the rest of the recording is not read: {fault}", file.display());
+            found.unused.push(format!("the rest of the recording is not read: {fault}"));
         }
         found.finish(source, file, &mut unused)?;
-        for (topic, (count, fault)) in unused.0 {
-            tracing::warn!("{}: {count} messages of `{topic}` are left out: {fault}", file.display());
-        }
+        let faults = unused.0.into_iter();
+        let what = |(topic, (count, fault))| format!("{count} messages of `{topic}` are left out: {fault}");
+        found.unused.extend(faults.map(what));
         Ok(found)
     }
 
@@ -187,6 +202,14 @@ impl RecordedMessages {
         }
         self.body_frame = self.body_frame.take().or(child);
         self.poses.push(StampedPose { timestamp: header.stamp.seconds(), pose });
+        Ok(())
+    }
+
+    fn add_acceleration(&mut self, message: &BagMessage<'_>) -> Result<(), String> {
+        let imu: Imu = message.decode().map_err(|error| text(&error))?;
+        let (timestamp, acceleration) = (imu.header.stamp.seconds(), imu.acceleration()?);
+        self.imu_frame.get_or_insert(imu.header.frame_id);
+        self.accelerometer.push(Acceleration { timestamp, acceleration });
         Ok(())
     }
 
@@ -233,12 +256,11 @@ impl RecordedMessages {
         let count = self.poses.len();
         self.poses.dedup_by(|b, a| a.timestamp == b.timestamp);
         if order + count - self.poses.len() > 0 {
-            tracing::warn!(
-                "{}: `{}`: {order} poses are out of order, {} have the time of another and are left out",
-                file.display(),
+            self.unused.push(format!(
+                "`{}`: {order} poses are out of order and were sorted, {} have the time of another and are left out",
                 self.odometry_topic,
                 count - self.poses.len()
-            );
+            ));
         }
         if self.poses.is_empty() {
             let why = unused.0.get(&self.odometry_topic).map(|(_, fault)| fault.as_str());
@@ -260,7 +282,7 @@ impl RecordedMessages {
             let count = self.boxes.len();
             self.boxes.retain(|image| image.camera > 0 || Some(image.frame.as_str()) == wanted);
             let others = count - self.boxes.len();
-            tracing::warn!("{}: {others} images of other cameras are left out", file.display());
+            self.unused.push(format!("{others} images of other cameras are left out"));
         }
         self.camera_frame = self.frame_of(0);
         Ok(())
@@ -280,10 +302,8 @@ impl RecordedMessages {
         let count = self.boxes.len();
         self.boxes.retain(|image| image.camera > 0 || image.topic == *first);
         if self.boxes.len() < count {
-            tracing::warn!(
-                "{} images are left out: no camera has their topic and frame",
-                count - self.boxes.len()
-            );
+            let others = count - self.boxes.len();
+            self.unused.push(format!("{others} images are left out: no camera has their topic and frame"));
         }
     }
 

@@ -57,7 +57,8 @@ mod recordings {
 
     type Message = (&'static str, f64, Vec<u8>);
 
-    const TOPICS: [(&str, MessageType); 8] = [
+    const TOPICS: [(&str, MessageType); 9] = [
+        ("/imu", IMU),
         ("/rear/detections", DETECTIONS),
         ("/rear/camera_info", CAMERA_INFO),
         ("/odom", ODOMETRY),
@@ -135,6 +136,32 @@ mod recordings {
         let seen = &found.detections[0];
         assert_eq!((seen.bounding_box.bounds(), seen.scores.best()), (CUP.0, Some(("cup", 0.8))));
         assert_eq!((found.cameras.first().model.fy, found.cameras.first().model.width), (510.0, 640));
+    }
+
+    #[test]
+    fn readings_of_an_imu_are_turned_to_the_camera() {
+        // the sensor is mounted upside down
+        let mount = Se3::new(So3::from_quaternion_xyzw([1.0, 0.0, 0.0, 0.0]).unwrap(), Vector3::zeros());
+        let transform: Message = ("/tf_static", 0.0, transform_message(0.0, "base_link", "imu", &mount));
+        let readings = || {
+            (0..40).map(|i| {
+                let t = 0.05 * f64::from(i);
+                ("/imu", t, imu_message(100.0 + t, "imu", [0.0, 0.0, -9.8]))
+            })
+        };
+        let found = load(json!({}), messages().into_iter().chain([transform]).chain(readings())).unwrap();
+        assert_eq!(found.accelerometer.len(), 40);
+        // y of the camera points down
+        let up = Vector3::new(0.0, -9.8, 0.0);
+        assert!(found.accelerometer.iter().all(|reading| (reading.acceleration - up).norm() < 1e-9));
+
+        let unknown = || messages().into_iter().chain(readings());
+        let found = load(json!({}), unknown()).unwrap();
+        assert!(found.accelerometer.is_empty());
+        let left_out = |unused: &UnusedInput| matches!(unused, UnusedInput::Recording(what) if what.contains("40 readings") && what.contains("imu"));
+        assert!(found.unused.iter().any(left_out), "{:?}", found.unused);
+        let error = load(json!({"imu": "/imu"}), unknown()).unwrap_err().to_string();
+        assert!(error.contains("the orientation of the IMU is not known"), "{error}");
     }
 
     /// A camera that looks back, with images at other times, on its own topics or on the topic of the first camera.
