@@ -9,6 +9,7 @@ mod latencies;
 mod pages;
 mod ply;
 mod run;
+mod scene_recording;
 mod xml;
 
 pub use canvas::Theme;
@@ -17,4 +18,5 @@ pub use latencies::latencies;
 pub use pages::{LiveMap, Phase, experiment_page, experiment_pictures, live_page, run_page};
 pub use ply::ply;
 pub use run::run_pictures;
+pub use scene_recording::SceneRecording;
 pub use xml::escape;

@@ -11,6 +11,7 @@ use clap::Args;
 use manifactor::slam::online::{FrameReport, Mapper, ObjectUpdates};
 use manifactor::slam::run::{MappedFrame, RunError, StreamEvent, StreamWatcher};
 use manifactor::solve::{Interrupt, Observer};
+use manifactor::viz::SceneRecording;
 use serde_json::json;
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
@@ -62,7 +63,7 @@ impl Online {
         let interrupt = interrupt::on_ctrl_c();
         let for_results = interrupt.clone();
         let mut view = self.view.map(View::open).transpose()?;
-        let report = self.options.run_as("online", verbose, for_results, |run, variant| {
+        let report = self.options.run_as("online", verbose, for_results, |run, variant, scene| {
             if let Some(view) = &mut view {
                 view.begin(&run.document.title, &variant.name, self.options.json);
             }
@@ -75,6 +76,8 @@ impl Online {
                 interrupt: interrupt.clone(),
                 progress: Progress::new(verbose, &variant.name),
                 view: view.as_ref(),
+                scene: scene.as_mut().map(|scene| (scene, format!("{}/live", variant.name))),
+                shown: ObjectUpdates::default(),
                 frames: 0,
                 begun: None,
                 objects: ObjectUpdates::default(),
@@ -126,6 +129,10 @@ struct Frames<'a> {
     begun: Option<(Instant, f64)>,
     /// Objects as printed last.
     objects: ObjectUpdates,
+    /// File for viewers, with the name of the growing map in it.
+    scene: Option<(&'a mut SceneRecording, String)>,
+    /// Objects as written to this file last.
+    shown: ObjectUpdates,
 }
 
 /// Interval at which a waiting command checks for an interrupt.
@@ -180,6 +187,9 @@ impl Frames<'_> {
             Ok(report) => report,
             Err(error) => return output::print_note(&error.to_string()),
         };
+        if let Some((scene, name)) = &mut self.scene {
+            scene.add_frame(name, (report.timestamp, &report.pose), &self.shown.take(frame.mapper));
+        }
         report.refused.iter().for_each(|refused| output::print_note(refused));
         let frames = count(report.frame + 1, "frame");
         if let Some(located) = &report.located {

@@ -14,7 +14,8 @@ use manifactor::slam::report::{RunReport, VariantReport};
 use manifactor::slam::run::{Run as Running, RunError};
 use manifactor::slam::run_document::RunVariant;
 use manifactor::solve::{AllObservers, Interrupt, Observer};
-use manifactor::viz::{latencies, ply, run_page};
+use manifactor::viz::{SceneRecording, latencies, ply, run_page};
+use std::io::ErrorKind;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -46,6 +47,10 @@ pub(crate) struct RunOptions {
     /// Write into a folder that holds other files, and overwrite files with the same names.
     #[arg(long)]
     force: bool,
+    /// Write the map to an MCAP file for viewers such as Foxglove: objects, path and poses. `manifactor online` adds the
+    /// growing map.
+    #[arg(long, value_name = "FILE")]
+    write_mcap: Option<PathBuf>,
     /// Print JSON: the report that is also written.
     #[arg(long)]
     pub(crate) json: bool,
@@ -54,7 +59,7 @@ pub(crate) struct RunOptions {
 impl Run {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
         let mut interrupt = interrupt::on_ctrl_c();
-        let report = self.options.run_as("run", verbose, interrupt.clone(), |run, variant| {
+        let report = self.options.run_as("run", verbose, interrupt.clone(), |run, variant, _| {
             let mut watch = Watch::new(verbose, &variant.name);
             run.run_variant(variant, &mut AllObservers(vec![&mut watch, &mut interrupt]))
         })?;
@@ -66,6 +71,22 @@ impl Run {
 }
 
 impl RunOptions {
+    /// Creates the file of `--write-mcap`.
+    fn open_scene(&self) -> Result<Option<SceneRecording>, Failure> {
+        let Some(file) = &self.write_mcap else { return Ok(None) };
+        SceneRecording::create(file, self.force).map(Some).map_err(|error| self.scene_failure(error))
+    }
+
+    /// Returns the failure of writing the file of `--write-mcap`.
+    fn scene_failure(&self, error: std::io::Error) -> Failure {
+        let file = self.write_mcap.clone().unwrap_or_default();
+        if error.kind() == ErrorKind::AlreadyExists {
+            let message = format!("--write-mcap: {} exists", file.display());
+            return Failure::with_help(message, "name a new file, or give --force to overwrite it");
+        }
+        Failure::File { path: file, source: error }
+    }
+
     /// Estimates each variant until an interrupt, writes all results, and prints the table unless JSON is
     /// requested. An interrupt after the solves ends the drawing of pictures, and the report then marks the
     /// run as incomplete.
@@ -74,7 +95,11 @@ impl RunOptions {
         command: &str,
         verbose: u8,
         mut interrupt: Interrupt,
-        mut estimate: impl FnMut(&mut Running<'_>, &RunVariant) -> Result<(Estimate, VariantReport), RunError>,
+        mut estimate: impl FnMut(
+            &mut Running<'_>,
+            &RunVariant,
+            &mut Option<SceneRecording>,
+        ) -> Result<(Estimate, VariantReport), RunError>,
     ) -> Result<RunReport, Failure> {
         let mut document = self.run.open()?;
         if let Some(out) = &self.out {
@@ -83,12 +108,16 @@ impl RunOptions {
         refuse_own_maps(&document)?;
         // the claim lasts to the end
         let _claimed = OutputFolder::claim(&document.output, command, &self.run.config, self.force)?;
+        let mut scene = self.open_scene()?;
         let (mut records, mut configs) = (vec![], vec![]);
         let style = PictureStyle::default();
         let mut run = Running::new(&document, self.run.data());
         for variant in &document.variants {
             tracing::info!("variant {}", variant.name);
-            let (estimate, report) = estimate(&mut run, variant)?;
+            let (estimate, report) = estimate(&mut run, variant, &mut scene)?;
+            if let Some(scene) = &mut scene {
+                scene.add_estimate(&variant.name, &estimate);
+            }
             let mut watch = Watch::new(verbose, &variant.name);
             watch.show("writing the results");
             let record = VariantRecord::new(variant, &estimate);
@@ -103,6 +132,9 @@ impl RunOptions {
             if interrupt.poll().is_break() {
                 break;
             }
+        }
+        if let Some(scene) = scene {
+            scene.finish().map_err(|error| self.scene_failure(error))?;
         }
         let mut watch = Watch::new(verbose, &document.title);
         watch.show("writing the report");
