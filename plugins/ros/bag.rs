@@ -7,6 +7,7 @@ use crate::decode::{DecodeError, Definition};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 pub use folder::is_recording;
 
@@ -106,10 +107,7 @@ impl Ending {
 pub fn read(path: &Path, mut visit: impl FnMut(BagMessage<'_>)) -> Result<Ending, BagError> {
     let mut ending = Ending::Complete;
     for file in folder::files(path)? {
-        let found = match format(&file)? {
-            FileFormat::Mcap => mcap_file::read(&file, &mut visit)?,
-            FileFormat::Sqlite => sqlite_file::read(&file, &mut visit)?,
-        };
+        let found = read_file(&file, &mut visit)?;
         // the first fault; the other files are read nevertheless
         if ending == Ending::Complete {
             ending = match found {
@@ -123,9 +121,41 @@ pub fn read(path: &Path, mut visit: impl FnMut(BagMessage<'_>)) -> Result<Ending
     Ok(ending)
 }
 
+fn read_file(path: &Path, visit: &mut dyn FnMut(BagMessage<'_>)) -> Result<Ending, BagError> {
+    match format(path)? {
+        FileFormat::Mcap => mcap_file::read(path, visit),
+        FileFormat::Sqlite => sqlite_file::read(path, visit),
+        FileFormat::Zstd => {
+            let io = |source| BagError::Io { path: path.to_owned(), source };
+            let mut plain = NamedTempFile::new().map_err(io)?;
+            let fault = match zstd::stream::copy_decode(File::open(path).map_err(io)?, &mut plain) {
+                Err(fault) if plain.as_file().metadata().map_err(io)?.len() == 0 => return Err(io(fault)),
+                ended => ended.err(),
+            };
+            let named = |error| match error {
+                BagError::Format { found, .. } => BagError::Format { path: path.to_owned(), found },
+                other => other,
+            };
+            if matches!(format(plain.path()).map_err(named)?, FileFormat::Zstd) {
+                return Err(BagError::Format {
+                    path: path.to_owned(),
+                    found: "a file compressed twice by zstd",
+                });
+            }
+            let ending = read_file(plain.path(), visit)?;
+            // a file that is cut off is read up to there
+            Ok(fault.map_or(ending, |fault| {
+                Ending::Fault(format!("it cannot be decompressed completely: {fault}"))
+            }))
+        }
+    }
+}
+
 enum FileFormat {
     Mcap,
     Sqlite,
+    /// One of the others, compressed.
+    Zstd,
 }
 
 /// Returns the format of a file by its first bytes.
@@ -136,9 +166,9 @@ fn format(path: &Path) -> Result<FileFormat, BagError> {
     let found = match &start[..] {
         start if start.starts_with(MCAP) => return Ok(FileFormat::Mcap),
         start if start == SQLITE => return Ok(FileFormat::Sqlite),
+        start if start.starts_with(ZSTD) => return Ok(FileFormat::Zstd),
         [] => "an empty file",
         start if start.starts_with(ROS_1) => "a recording of ROS 1: convert it to MCAP with `mcap convert`",
-        start if start.starts_with(ZSTD) => "a file compressed by zstd: decompress it with `zstd -d`",
         _ => "something else",
     };
     Err(BagError::Format { path: path.to_owned(), found })
@@ -174,6 +204,27 @@ mod tests {
             let Ending::Fault(fault) = ending else { panic!("cut off at {end}") };
             assert!(fault.starts_with("the file is cut off, after"), "{fault}");
         }
+    }
+
+    #[test]
+    fn a_compressed_file_is_read_up_to_its_end() {
+        let sent: Vec<String> =
+            (0..20_000_u64).map(|i| format!("{}", i.wrapping_mul(0x9e37_79b9_7f4a_7c15))).collect();
+        let messages = sent.iter().zip(0..).map(|(text, i)| ("/chatter", i as f64, string_message(text)));
+        let whole = zstd::encode_all(&recording(&[("/chatter", STRING)], messages)[..], 0).unwrap();
+        assert_eq!(texts(&whole), (sent.clone(), Ending::Complete));
+        let (read_before, ending) = texts(&whole[..whole.len() / 2]);
+        let Ending::Fault(fault) = ending else { panic!("complete") };
+        assert!(fault.contains("decompressed") && read_before.len() > 5_000, "{fault}");
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), &whole[..20]).unwrap();
+        assert!(read(file.path(), |_| ()).is_err());
+        std::fs::write(file.path(), zstd::encode_all(&whole[..], 0).unwrap()).unwrap();
+        let error = read(file.path(), |_| ()).unwrap_err().to_string();
+        assert!(
+            error.contains("compressed twice") && error.contains(&*file.path().to_string_lossy()),
+            "{error}"
+        );
     }
 
     #[test]

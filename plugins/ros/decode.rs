@@ -7,6 +7,7 @@ use re_ros_msg::message_spec::{
 };
 use serde_json::{Map, Value};
 use std::collections::HashMap;
+use std::io::Read;
 
 /// Encoding of messages and of definitions.
 const ENCODINGS: [&str; 2] = ["cdr", "ros2msg"];
@@ -14,6 +15,8 @@ const ENCODINGS: [&str; 2] = ["cdr", "ros2msg"];
 const HEADER_BYTES: usize = 4;
 /// Messages are padded to a multiple of this.
 const ALIGNMENT_BYTES: usize = 4;
+/// Length of the longest message that is decompressed. Unit: bytes.
+const MAX_MESSAGE_BYTES: u64 = 1 << 30;
 /// Largest depth of messages within messages.
 const MAX_DEPTH: usize = 32;
 /// Longest list of bytes that is decoded. Longer ones are images and point clouds.
@@ -82,14 +85,19 @@ impl Definition {
 
     /// Decodes a message.
     pub(crate) fn decode(&self, data: &[u8]) -> Result<Value, DecodeError> {
+        if data.starts_with(ZSTD) {
+            let mut plain = vec![];
+            let read = zstd::Decoder::new(data)
+                .and_then(|from| from.take(MAX_MESSAGE_BYTES).read_to_end(&mut plain));
+            return match read {
+                Ok(_) if !plain.starts_with(ZSTD) => self.decode(&plain),
+                Ok(_) => Err(DecodeError::Content("it is compressed twice".into())),
+                Err(error) => Err(DecodeError::Content(format!("it cannot be decompressed: {error}"))),
+            };
+        }
         let Some((header, content)) = data.split_at_checked(HEADER_BYTES) else {
             return Err(DecodeError::Content("it is shorter than its header".into()));
         };
-        if header == ZSTD {
-            return Err(DecodeError::Content(
-                "messages are compressed one by one: convert the recording with `ros2 bag convert`".into(),
-            ));
-        }
         let decoded = match header[1] {
             0 => self.whole_message(&mut CdrReader::<BigEndian>::new(content)),
             1 => self.whole_message(&mut CdrReader::<LittleEndian>::new(content)),
@@ -247,6 +255,10 @@ mod tests {
             let error = definition(text).decode(&data).unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
         }
+        let compressed = zstd::encode_all(&Cdr::new().f64(2.5).bytes()[..], 0).unwrap();
+        assert_eq!(definition("float64 x").decode(&compressed).unwrap()["x"], 2.5);
+        let error = definition("float64 x").decode(&compressed[..9]).unwrap_err().to_string();
+        assert!(error.contains("cannot be decompressed"), "{error}");
         let wrong =
             Definition::new("a/B", "protobuf", STRING.1.as_bytes(), "protobuf").unwrap_err().to_string();
         assert!(wrong.contains("got `protobuf` and `protobuf`"), "{wrong}");

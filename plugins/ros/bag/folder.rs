@@ -10,8 +10,18 @@ pub fn is_recording(path: &Path) -> bool {
     if path.is_dir() { files(path).is_ok() } else { has_extension(path) }
 }
 
+/// Returns whether the extension is that of a recording, or of one compressed by zstd.
 fn has_extension(path: &Path) -> bool {
-    path.extension().and_then(|extension| extension.to_str()).is_some_and(|own| EXTENSIONS.contains(&own))
+    let plain = without_compression(path);
+    plain.extension().and_then(|extension| extension.to_str()).is_some_and(|own| EXTENSIONS.contains(&own))
+}
+
+fn without_compression(path: &Path) -> PathBuf {
+    if path.extension().is_some_and(|extension| extension == "zstd") {
+        path.with_extension("")
+    } else {
+        path.to_owned()
+    }
 }
 
 /// Returns the files of a recording: the file itself, or those of a folder by the number at the end of their names.
@@ -33,7 +43,7 @@ pub(super) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
     if files.is_empty() {
         return Err(BagError::Format {
             path: path.to_owned(),
-            found: "a folder without `.mcap` or `.db3` files; compressed ones need `zstd -d`",
+            found: "a folder without `.mcap` or `.db3` files",
         });
     }
     files.sort_by_key(|file| (number(file), file.clone()));
@@ -42,7 +52,8 @@ pub(super) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
 
 /// Returns the number at the end of a name, such as 12 in `drive_12.mcap`.
 fn number(file: &Path) -> u64 {
-    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    let plain = without_compression(file);
+    let stem = plain.file_stem().unwrap_or_default().to_string_lossy();
     let digits = stem.rsplit(|c: char| !c.is_ascii_digit()).next().unwrap_or_default();
     digits.parse().unwrap_or(0)
 }
@@ -54,12 +65,12 @@ mod tests {
     #[test]
     fn files_are_in_the_order_of_their_numbers() {
         let folder = tempfile::tempdir().unwrap();
-        for name in ["drive_10.mcap", "drive_9.mcap", "drive_0.mcap", "metadata.yaml"] {
+        for name in ["drive_10.mcap", "drive_9.mcap", "drive_0.mcap.zstd", "metadata.yaml"] {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
         let files = files(folder.path()).unwrap();
         let names: Vec<_> = files.iter().map(|file| file.file_name().unwrap().to_str().unwrap()).collect();
-        assert_eq!(names, ["drive_0.mcap", "drive_9.mcap", "drive_10.mcap"]);
+        assert_eq!(names, ["drive_0.mcap.zstd", "drive_9.mcap", "drive_10.mcap"]);
         assert!(
             is_recording(folder.path())
                 && is_recording(Path::new("a.db3"))
