@@ -266,7 +266,13 @@ impl RecordedMessages {
             let why = unused.0.get(&self.odometry_topic).map(|(_, fault)| fault.as_str());
             return Err(no_poses(&self.odometry_topic, why));
         }
+        if let ([only], 2..) = (&self.poses[..], count) {
+            let why =
+                format!("all {count} messages have the time {} s: their headers need stamps", only.timestamp);
+            return Err(no_poses(&self.odometry_topic, Some(&why)));
+        }
         self.assign_cameras(source);
+        self.count_images_at_one_time();
         let of_first = || self.boxes.iter().filter(|image| image.camera == 0);
         let cameras: BTreeSet<&str> = of_first().map(|image| image.frame.as_str()).collect();
         let wanted = source.camera_frame.as_deref();
@@ -286,6 +292,22 @@ impl RecordedMessages {
         }
         self.camera_frame = self.frame_of(0);
         Ok(())
+    }
+
+    /// Reports images of a camera with the time of another one, with which they become one frame.
+    fn count_images_at_one_time(&mut self) {
+        let mut times: Vec<(usize, f64)> =
+            self.boxes.iter().map(|image| (image.camera, image.timestamp)).collect();
+        let count = times.len();
+        times.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        times.dedup();
+        let others = count - times.len();
+        if others > 0 {
+            self.unused.push(format!(
+                "{others} of {count} images have the time of another image of their camera, and are one frame with it: do \
+                 their headers have stamps?"
+            ));
+        }
     }
 
     /// Assigns each image to the further camera with its topic and frame; the remaining ones are of the first camera.

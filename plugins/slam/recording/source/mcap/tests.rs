@@ -164,6 +164,20 @@ mod recordings {
         assert!(error.contains("the orientation of the IMU is not known"), "{error}");
     }
 
+    #[test]
+    fn messages_without_stamps_are_an_error_or_reported() {
+        let odometry = (0..5).map(|i| {
+            let t = f64::from(i);
+            ("/odom", t, odometry_message(0.0, "odom", "base_link", &body(t)))
+        });
+        let error = load(json!({}), without("/odom").chain(odometry)).unwrap_err().to_string();
+        assert!(error.contains("all 5 messages have the time 0 s"), "{error}");
+        let again: Message = ("/detections", 0.1, detections_message(100.05, "camera", &[CUP]));
+        let found = load(json!({}), messages().into_iter().chain([again])).unwrap();
+        let reported = |unused: &UnusedInput| matches!(unused, UnusedInput::Recording(what) if what.contains("1 of 31 images have the time of another"));
+        assert!(found.unused.iter().any(reported), "{:?}", found.unused);
+    }
+
     /// A camera that looks back, with images at other times, on its own topics or on the topic of the first camera.
     fn rear(topic: &'static str) -> Vec<Message> {
         let distortion: (&str, &[f64]) = ("plumb_bob", &[0.0; 5]);
