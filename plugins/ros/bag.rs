@@ -3,7 +3,7 @@ mod folder;
 mod mcap_file;
 mod sqlite_file;
 
-use crate::decode::{DecodeError, Definition};
+use crate::decode::{DecodeError, Definition, ZSTD};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -17,8 +17,6 @@ const SQLITE: &[u8] = b"SQLite format 3";
 const ROS_1: &[u8] = b"#ROSBAG";
 /// First bytes of an MCAP file.
 const MCAP: &[u8] = b"\x89MCAP";
-/// First bytes of data compressed by zstd.
-pub(crate) const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 
 /// Error that prevents reading a recording.
 #[derive(Debug, thiserror::Error)]

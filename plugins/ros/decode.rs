@@ -1,5 +1,4 @@
 //! Decoding of messages by the definition of their type in the recording.
-use crate::bag::ZSTD;
 use re_cdr::{BigEndian, CdrEndian, CdrReader, LittleEndian};
 use re_ros_msg::MessageSchema;
 use re_ros_msg::message_spec::{
@@ -11,6 +10,8 @@ use std::io::Read;
 
 /// Encoding of messages and of definitions.
 const ENCODINGS: [&str; 2] = ["cdr", "ros2msg"];
+/// First bytes of data compressed by zstd.
+pub(crate) const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 /// Bytes before the content: the byte order, and options.
 const HEADER_BYTES: usize = 4;
 /// Messages are padded to a multiple of this.

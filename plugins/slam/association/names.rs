@@ -110,6 +110,7 @@ mod tests {
             camera,
             bounding_box,
             quantities: manifactor_recording::measurement::Quantities::NONE,
+            ellipse: None,
         };
         let put = |from, into| {
             let (from, into) = (ObjectId(from), ObjectId(into));

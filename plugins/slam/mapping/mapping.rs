@@ -12,14 +12,16 @@ use crate::settings::{DetectionSettings, OdometrySettings, RunSettings};
 use manifactor_formats::plausible;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::{Prior, Se3};
-use manifactor_graph::{FactorEntry, Graph, GraphError, Key, Values, Variable};
+use manifactor_graph::{FactorEntry, Graph, GraphError, Key, Noise, Values, Variable};
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
 use manifactor_recording::camera::MountedCamera;
+use manifactor_recording::ellipse::ImageEllipse;
 use manifactor_recording::fusion::FusedClass;
 use manifactor_recording::measurement::MeasurementSigmas;
 use manifactor_recording::prior_map::PriorObject;
 use manifactor_recording::sequence::jumps::{OdometryJump, find_jumps};
 use manifactor_recording::sequence::{Frame, ObjectId, Sequence, UnusedInput};
+use manifactor_semantic::ConicDistance;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -447,7 +449,7 @@ fn jump_warnings(sequence: &Sequence) -> impl Iterator<Item = Warning> {
     )
 }
 
-/// Returns the factors of a detection: the box factor, then the factors of its further measurements.
+/// Returns the factors of a detection: that of its ellipse or box, then the factors of its further measurements.
 pub fn view_entries<'a>(
     view: &'a ObjectBox,
     object: &'a Key,
@@ -455,7 +457,22 @@ pub fn view_entries<'a>(
 ) -> impl Iterator<Item = FactorEntry> + 'a {
     let errors = MeasurementSigmas { depth: *settings.depth_error };
     let others = view.quantities.entries(view.frame, &view.camera, object, errors, settings.loss.as_ref());
-    box_entry(view, object.clone(), settings).into_iter().chain(others)
+    outline_entry(view, object.clone(), settings).into_iter().chain(others)
+}
+
+/// Returns the factor of an ellipse, or else of a box.
+fn outline_entry(view: &ObjectBox, object: Key, settings: &DetectionSettings) -> Option<FactorEntry> {
+    let Some(ImageEllipse { centre, semi_axes, angle }) = view.ellipse else {
+        return box_entry(view, object, settings);
+    };
+    let factor = ConicDistance { centre, semi_axes, angle, camera: view.camera.model };
+    Some(FactorEntry {
+        keys: vec![pose_key(view.frame), object],
+        name: None,
+        factor: view.camera.on_first(Arc::new(factor)).ok()?,
+        noise: Noise::sigma(*settings.ellipse_error).ok()?,
+        loss: settings.loss.clone(),
+    })
 }
 
 /// Returns the factor of a box.

@@ -10,6 +10,7 @@ pub mod __private {
 
 pub mod camera;
 pub mod class;
+pub mod ellipse;
 pub mod fusion;
 pub mod keys;
 pub mod measurement;

@@ -41,11 +41,12 @@ pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
 /// # Errors
 /// If a file cannot be written.
 pub fn write_detections(sequence: &Sequence, stem: &Path) -> Result<(), FormatError> {
+    if sequence.detections.iter().any(|detection| detection.ellipse.is_some()) {
+        return Err(no_column(stem, "ellipse"));
+    }
     let quantities = sequence.detections.iter().flat_map(|detection| detection.quantities.iter());
     if let Some(other) = quantities.map(Measurement::name).find(|name| *name != "depth") {
-        let message = format!("detections with `{other}` have no column here: use JSON lines");
-        let source = io::Error::new(io::ErrorKind::Unsupported, message);
-        return Err(FormatError::Io { path: stem.to_owned(), source });
+        return Err(no_column(stem, other));
     }
     for camera in sequence.cameras.iter() {
         let own = sequence.detections.iter().filter(|detection| detection.camera.index == camera.index);
@@ -55,6 +56,12 @@ pub fn write_detections(sequence: &Sequence, stem: &Path) -> Result<(), FormatEr
         detections::write(file, &rows)?;
     }
     Ok(())
+}
+
+/// Returns the error of detections with a field that a table does not have.
+fn no_column(stem: &Path, field: &str) -> FormatError {
+    let message = format!("detections with `{field}` have no column here: use JSON lines");
+    FormatError::Io { path: stem.to_owned(), source: io::Error::new(io::ErrorKind::Unsupported, message) }
 }
 
 fn row(sequence: &Sequence, detection: &Detection) -> Option<DetectionRow> {

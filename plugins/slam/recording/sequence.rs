@@ -4,6 +4,7 @@
 //! `world_from_camera` maps a point in the camera frame to the world frame. The camera looks along +z; in the
 //! image x points right and y down.
 use crate::camera::{Cameras, MountedCamera};
+use crate::ellipse::ImageEllipse;
 use crate::measurement::Quantities;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -249,6 +250,8 @@ pub struct Detection {
     pub bounding_box: BoundingBox,
     /// Measurements in addition to the box.
     pub quantities: Quantities,
+    /// Outline of the object, if measured. It belongs to the box.
+    pub ellipse: Option<ImageEllipse>,
 }
 
 /// Scores of a detector by class, each from 0 to 1; classes that are not listed score 0. Classes with scores

@@ -7,6 +7,7 @@ use super::{SimulatedSource, catalogue, noise};
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
 use manifactor_recording::camera::MountedCamera;
+use manifactor_recording::ellipse::ImageEllipse;
 use manifactor_recording::measurement::Quantities;
 use manifactor_recording::sequence::{ClassScores, Detection};
 use rand::{RngExt, SeedableRng};
@@ -45,6 +46,7 @@ struct SimulatedBox {
     bounding_box: BoundingBox,
     scores: ClassScores,
     quantities: Quantities,
+    ellipse: Option<ImageEllipse>,
     assigned_to: usize,
 }
 
@@ -84,18 +86,41 @@ impl SimulatedSource {
                 if let Some(moved) = scene.moved_object(i, time) {
                     seen = self.detect_object(i, moved, &view, class, &mut after);
                 }
-                if let Some(SimulatedBox { bounding_box, scores, quantities, assigned_to: taken_for }) = seen
+                if let Some(SimulatedBox {
+                    bounding_box,
+                    scores,
+                    quantities,
+                    ellipse,
+                    assigned_to: taken_for,
+                }) = seen
                 {
                     let object = Some(scene.object_at(taken_for, time).truth.id);
                     let camera = camera.clone();
-                    detections.push(Detection { frame, object, scores, camera, bounding_box, quantities });
+                    detections.push(Detection {
+                        frame,
+                        object,
+                        scores,
+                        camera,
+                        bounding_box,
+                        quantities,
+                        ellipse,
+                    });
                 }
             }
             for (bounding_box, scores) in self.detector.draw_false_boxes(&camera.model, &classes, imagination)
             {
                 let quantities = Quantities::NONE;
                 let camera = camera.clone();
-                detections.push(Detection { frame, object: None, scores, camera, bounding_box, quantities });
+                let (object, ellipse) = (None, None);
+                detections.push(Detection {
+                    frame,
+                    object,
+                    scores,
+                    camera,
+                    bounding_box,
+                    quantities,
+                    ellipse,
+                });
             }
         }
         detections
@@ -126,7 +151,9 @@ impl SimulatedSource {
         let taken_for = noise::draw_assigned_object(*self.detector.wrong_object, i, objects, mistakes);
         let away = view.pose.inverse().act(&world_from_object.translation).z;
         let quantities = self.detector.draw_measurements(away, depths);
+        let outline = object.solid.outline(&view.pose.between(world_from_object), view.camera);
+        let ellipse = self.detector.draw_ellipse(outline, depths);
         let bounding_box = drawn.filter(|_| left.is_some())?;
-        Some(SimulatedBox { bounding_box, scores, quantities, assigned_to: taken_for })
+        Some(SimulatedBox { bounding_box, scores, quantities, ellipse, assigned_to: taken_for })
     }
 }

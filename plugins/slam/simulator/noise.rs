@@ -3,9 +3,10 @@ use manifactor_geometry::Se3;
 use manifactor_graph::Manifold;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_quadric::{BoundingBox, Camera};
+use manifactor_recording::ellipse::ImageEllipse;
 use manifactor_recording::measurement::{DepthMeasurement, Quantities};
 use manifactor_recording::sequence::ClassScores;
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Matrix2, SymmetricEigen, Vector2, Vector3, Vector6};
 use rand::RngExt;
 use rand_distr::{Distribution, Poisson, StandardNormal};
 use rand_pcg::Pcg64;
@@ -149,6 +150,10 @@ pub struct DetectorSettings {
     /// no depths.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth_error: Option<Positive>,
+    /// Standard deviation of the centre and the semi-axes of ellipses with the moments of the convex hull of an object's
+    /// outline. Default: no ellipses. Unit: pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ellipse_error: Option<Positive>,
 }
 
 impl Default for DetectorSettings {
@@ -168,6 +173,7 @@ impl Default for DetectorSettings {
             misclassified: Share::literal(0.0),
             confused: Share::literal(0.0),
             depth_error: None,
+            ellipse_error: None,
         }
     }
 }
@@ -226,6 +232,25 @@ impl DetectorSettings {
         let error = relative.get() * normal(rng);
         let measured = Positive::new(depth * (1.0 + error));
         measured.map_or(Quantities::NONE, |measured| Quantities::one(DepthMeasurement(measured)))
+    }
+
+    /// Returns the measured ellipse of an outline.
+    pub(super) fn draw_ellipse(
+        &self,
+        outline: Option<ImageEllipse>,
+        rng: &mut Pcg64,
+    ) -> Option<ImageEllipse> {
+        let sigma = self.ellipse_error?.get();
+        let [x, y, a, b, c] = [(); 5].map(|()| sigma * normal(rng));
+        let outline = outline?;
+        // noise of the square root of the shape is noise of the semi-axes
+        let shape = outline.shape();
+        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(shape);
+        let root =
+            eigenvectors * Matrix2::from_diagonal(&eigenvalues.map(f64::sqrt)) * eigenvectors.transpose();
+        let off = c / std::f64::consts::SQRT_2;
+        let root = root + Matrix2::new(a, off, off, b);
+        ImageEllipse::from_shape(Vector2::from(outline.centre) + Vector2::new(x, y), root * root.transpose())
     }
 
     /// Returns the false boxes of an image.

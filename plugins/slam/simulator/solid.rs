@@ -1,7 +1,8 @@
 //! True shapes of objects: solids with flat faces, which an ellipsoid only approximates.
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
-use nalgebra::{Vector2, Vector3};
+use manifactor_recording::ellipse::ImageEllipse;
+use nalgebra::{Matrix2, Vector2, Vector3};
 use std::f64::consts::TAU;
 
 /// Near plane: closer parts are not visible. Unit: metres.
@@ -110,6 +111,31 @@ impl Solid {
         Some(ImageBoxes { whole: whole.bounding_box()?, inside: inside.bounding_box()? })
     }
 
+    /// Returns the ellipse with the moments of the convex hull of the outline in an image without a border. `None` if a part
+    /// is not in front of the camera.
+    pub(crate) fn outline(&self, camera_from_object: &Se3, camera: &Camera) -> Option<ImageEllipse> {
+        let seen: Vec<Vector3<f64>> = self.corners().map(|corner| camera_from_object.act(corner)).collect();
+        if seen.iter().any(|corner| corner.z <= NEAR_PLANE_M) {
+            return None;
+        }
+        let hull = convex_hull(seen.iter().map(|corner| project(camera, corner)).collect());
+        let origin = *hull.first()?;
+        let (mut area, mut first, mut second) = (0.0, Vector2::zeros(), Matrix2::zeros());
+        // moments of the triangles from the first corner
+        for pair in hull.windows(2) {
+            let (a, b) = (pair[0] - origin, pair[1] - origin);
+            let part = 0.5 * a.perp(&b);
+            area += part;
+            first += (a + b) * (part / 3.0);
+            let sum = a + b;
+            second += (a * a.transpose() + b * b.transpose() + sum * sum.transpose()) * (part / 12.0);
+        }
+        let mean = first / area;
+        let covariance = second / area - mean * mean.transpose();
+        // a uniform ellipse has a quarter of its squared semi-axes as variance
+        ImageEllipse::from_shape(origin + mean, covariance * 4.0)
+    }
+
     /// Returns the parts of the faces in front of a camera, in the camera frame.
     pub(super) fn in_front(&self, camera_from_object: &Se3) -> impl Iterator<Item = Vec<Vector3<f64>>> {
         self.faces.iter().map(|face| {
@@ -132,6 +158,28 @@ pub(crate) struct ImageBoxes {
 pub(super) fn project(camera: &Camera, p: &Vector3<f64>) -> Vector2<f64> {
     let (x, y) = (p.x / p.z, p.y / p.z);
     Vector2::new(camera.fx * x + camera.skew * y + camera.cx, camera.fy * y + camera.cy)
+}
+
+/// Returns the corners of the convex hull, counter-clockwise in x and y (Andrew's monotone chain).
+fn convex_hull(mut points: Vec<Vector2<f64>>) -> Vec<Vector2<f64>> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let half = |points: &mut dyn Iterator<Item = &Vector2<f64>>| {
+        let mut chain: Vec<Vector2<f64>> = vec![];
+        for p in points {
+            while let [.., a, b] = chain[..]
+                && (b - a).perp(&(p - b)) <= 0.0
+            {
+                chain.pop();
+            }
+            chain.push(*p);
+        }
+        // it is the first one of the other half
+        chain.pop();
+        chain
+    };
+    let mut hull = half(&mut points.iter());
+    hull.extend(half(&mut points.iter().rev()));
+    hull
 }
 
 /// Returns whether a point is in a convex polygon of either orientation.
@@ -197,6 +245,17 @@ mod tests {
         let found = boxes.whole.bounds();
         assert!(expected.iter().zip(found).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
         assert_eq!(boxes.whole, boxes.inside);
+    }
+
+    #[test]
+    fn the_ellipse_has_the_moments_of_the_outline() {
+        // a rectangle of 100 × 50 px has the variances 100²/12 and 50²/12, a quarter of the squared semi-axes
+        let plate = Solid::cuboid([1.25, 0.625, 1e-9]);
+        let ellipse = plate.outline(&at(0.0, 0.0, 4.0), &CAMERA).unwrap();
+        let expected = Matrix2::new(1e4 / 3.0, 0.0, 0.0, 2500.0 / 3.0);
+        assert!((ellipse.shape() - expected).norm() < 1e-4, "{}", ellipse.shape());
+        assert!((Vector2::from(ellipse.centre) - Vector2::new(320.0, 240.0)).norm() < 1e-6);
+        assert!(plate.outline(&at(0.0, 0.0, 0.0), &CAMERA).is_none());
     }
 
     #[test]

@@ -268,6 +268,7 @@ fn rejected_boxes_are_reported_and_the_pose_is_accepted() {
         scores: ClassScores::single("cup", 0.5),
         // its square is infinite
         quantities: Quantities::NONE,
+        ellipse: None,
         bounding_box: BoundingBox { xmin: 1e200, ymin: 1e200, xmax: 2e200, ymax: 2e200 },
     };
     let measured = mapper.measurements().clone();

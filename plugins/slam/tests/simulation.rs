@@ -94,3 +94,29 @@ fn errors_are_as_large_as_covariances_say_where_the_noise_is_known() {
     let (poses, objects) = (mean(&|i| all[i].poses.unwrap()), mean(&|i| all[i].objects.unwrap()));
     assert!((0.7..1.4).contains(&poses) && (0.7..1.4).contains(&objects), "{poses} {objects} {all:?}");
 }
+
+#[test]
+fn ellipses_of_outlines_replace_boxes_unless_the_border_cuts_them() {
+    let text = r#"
+source = { type = "simulated", scene = { objects = 8 }, trajectory = { frames = 60 }, detector = { ellipse_error = 1.0 } }
+odometry = { noise = { sigma = 0.005 } }
+detections = { noise = { sigma = 2.0 }, ellipse_error = 1.0, border_px = 0.5, cut_sides = "mask" }
+variants = [{ name = "ellipses" }, { name = "boxes", set = { source = { type = "simulated", scene = { objects = 8 }, trajectory = { frames = 60 } } } }]
+"#;
+    let document = RunDocument::read(&Document::parse("run.toml", text, Format::Toml).unwrap()).unwrap();
+    let mut run = Run::new(&document, None);
+    let mut counts = vec![];
+    for variant in &document.variants {
+        let (estimate, _) = run.run_variant(variant, &mut Silent).unwrap();
+        let of = |name: &str| {
+            let factors = estimate.mapping.graph.factors();
+            factors.iter().filter(|entry| entry.factor.typetag_name() == name).count()
+        };
+        let termination = estimate.solution.outcome.termination;
+        assert!(termination.is_converged(), "{termination:?}");
+        counts.push([of("conic_distance"), of("bounding_box")]);
+    }
+    let [[ellipses, cut], [none, boxes]] = counts[..] else { panic!("{counts:?}") };
+    assert!(ellipses > 200 && cut > 0 && none == 0, "{counts:?}");
+    assert!(boxes.abs_diff(ellipses + cut) <= boxes / 10, "{counts:?}");
+}

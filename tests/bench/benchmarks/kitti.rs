@@ -107,6 +107,7 @@ pub(super) fn run(arguments: Arguments) -> BenchmarkResult {
             scores,
             camera: camera.clone(),
             bounding_box,
+            ellipse: None,
             quantities: Positive::new(n[12])
                 .map_or(Quantities::NONE, |z| Quantities::one(DepthMeasurement(z))),
         });

@@ -109,6 +109,7 @@ fn observations(text: &str) -> Vec<Observation> {
                     scores: ClassScores::single(word(7), number(6)),
                     camera: Cameras::new(super::stream::camera()).first().clone(),
                     bounding_box: BoundingBox { xmin, ymin, xmax, ymax },
+                    ellipse: None,
                     quantities: word(8)
                         .parse()
                         .ok()

@@ -8,6 +8,7 @@ use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
 use manifactor_recording::camera::MountedCamera;
 use manifactor_recording::class::ClassAliases;
+use manifactor_recording::ellipse::ImageEllipse;
 use manifactor_recording::fusion::{ClassFusion, FusedClass};
 use manifactor_recording::measurement::Quantities;
 use manifactor_recording::prior_map::PriorObject;
@@ -27,6 +28,8 @@ pub struct ObjectBox {
     pub inside: [bool; 4],
     /// Further measurements of the detection.
     pub quantities: Quantities,
+    /// Outline of the object in place of the box, if measured and not cut by the border.
+    pub ellipse: Option<ImageEllipse>,
 }
 
 impl ObjectBox {
@@ -225,7 +228,10 @@ pub fn filter_detection(detection: &Detection, settings: &DetectionSettings) -> 
         return FilteredDetection::Cut;
     }
     let (camera, quantities) = (detection.camera.clone(), detection.quantities.clone());
-    FilteredDetection::View(ObjectBox { frame: detection.frame, camera, bounding_box, inside, quantities })
+    // the moments of a mask change if the border cuts it
+    let ellipse = detection.ellipse.filter(|_| inside == [true; 4]);
+    let frame = detection.frame;
+    FilteredDetection::View(ObjectBox { frame, camera, bounding_box, inside, quantities, ellipse })
 }
 
 impl ObjectMeasurements {
@@ -306,6 +312,7 @@ mod tests {
             camera: sequence().cameras.first().clone(),
             bounding_box: BoundingBox::new(bounds).unwrap(),
             quantities: Quantities::NONE,
+            ellipse: None,
         }
     }
 

@@ -30,6 +30,10 @@ pub struct DetectionSettings {
     /// 0.03.
     #[serde(skip_serializing_if = "is_default_depth_error")]
     pub depth_error: Positive,
+    /// Standard deviation of the centre and the semi-axes of ellipses, if the source has ellipses. Default: 5. Unit:
+    /// pixels.
+    #[serde(skip_serializing_if = "is_default_ellipse_error")]
+    pub ellipse_error: Positive,
 }
 
 /// Treatment of a box that the image border cuts.
@@ -65,6 +69,15 @@ fn is_default_depth_error(depth_error: &Positive) -> bool {
     *depth_error == DEFAULT_DEPTH_ERROR
 }
 
+/// Default standard deviation of ellipses. Unit: pixels.
+const DEFAULT_ELLIPSE_ERROR: Positive = Positive::literal(5.0);
+
+/// The default is not written, because sources without ellipses have this setting as well.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_default_ellipse_error(error: &Positive) -> bool {
+    *error == DEFAULT_ELLIPSE_ERROR
+}
+
 /// Rows of a box residual.
 const SIDES: usize = 4;
 
@@ -88,6 +101,7 @@ impl Default for DetectionSettings {
             border_px: NotNegative::literal(20.0),
             min_score: Share::literal(0.0),
             depth_error: DEFAULT_DEPTH_ERROR,
+            ellipse_error: DEFAULT_ELLIPSE_ERROR,
         }
     }
 }

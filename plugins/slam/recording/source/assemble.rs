@@ -185,6 +185,7 @@ pub(super) fn detection(row: &DetectionRow, camera: &Arc<MountedCamera>) -> Dete
             .depth
             .and_then(|depth| Positive::new(depth).ok())
             .map_or(Quantities::NONE, |depth| Quantities::one(DepthMeasurement(depth))),
+        ellipse: None,
     }
 }
 

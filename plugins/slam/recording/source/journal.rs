@@ -128,6 +128,7 @@ mod tests {
                     scores: ClassScores::single("cup", 0.7),
                     object: Some(ObjectId(object)),
                     quantities: Quantities::default(),
+                    ellipse: None,
                 });
             }
         }

@@ -442,7 +442,7 @@ impl Mcap {
         let scores: ClassScores = scores.into_iter().map(|(class, score)| (name(class), score)).collect();
         let quantities = crate::measurement::Quantities::NONE;
         let camera = camera.clone();
-        Ok(Detection { frame: 0, object: None, scores, camera, bounding_box, quantities })
+        Ok(Detection { frame: 0, object: None, scores, camera, bounding_box, quantities, ellipse: None })
     }
 }
 

@@ -3,6 +3,7 @@
 //! The outline of an ellipsoid is a conic only for a pinhole camera. All code after a source therefore uses
 //! the rectified image, and camera models appear only in this module.
 use super::{CameraChoice, SourceError};
+use crate::sequence::Detection;
 use manifactor_geometry::{AnyCamera, Distortion, RadialTangential};
 use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::Vector2;
@@ -50,10 +51,15 @@ impl Rectification {
         Self { camera, model }
     }
 
-    /// Rectifies a box. Returns `None`, and leaves the box unchanged, if it has no place in the rectified image.
-    pub(super) fn rectify(&self, bounding_box: &mut BoundingBox) -> Option<()> {
+    /// Rectifies the box and the ellipse of a detection. Returns `None`, and leaves them unchanged, if they have no place in
+    /// the rectified image.
+    pub(super) fn rectify(&self, detection: &mut Detection) -> Option<()> {
         if let Some(model) = &self.model {
-            *bounding_box = rectified(&**model, bounding_box)?;
+            let bounding_box = rectified(&**model, &detection.bounding_box)?;
+            if let Some(ellipse) = &mut detection.ellipse {
+                *ellipse = ellipse.mapped(|point| model.rectify(point))?;
+            }
+            detection.bounding_box = bounding_box;
         }
         Some(())
     }

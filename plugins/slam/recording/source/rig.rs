@@ -84,6 +84,6 @@ impl Rig {
     }
 
     fn rectify(&self, detection: &mut Detection) -> Option<()> {
-        self.lenses.get(detection.camera.index)?.rectify(&mut detection.bounding_box)
+        self.lenses.get(detection.camera.index)?.rectify(detection)
     }
 }

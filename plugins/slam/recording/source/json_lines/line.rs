@@ -1,6 +1,7 @@
 //! A frame as a line of JSON.
 use super::super::interpolation::PoseOrImage;
 use crate::camera::Cameras;
+use crate::ellipse::ImageEllipse;
 use crate::measurement::{Quantities, measurement_schemas};
 use crate::sequence::pose_graph::{PoseFactor, PoseGraphChanges};
 use crate::sequence::{Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, UnusedInput};
@@ -90,6 +91,9 @@ struct LineBox {
     /// Name of a further camera in `source.cameras`. Default: the first camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     camera: Option<String>,
+    /// Outline of the object in place of the box, for example from a mask. The box is still needed, for data association.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    ellipse: Option<ImageEllipse>,
     #[serde(flatten)]
     #[schemars(skip)]
     quantities: IndexMap<String, Value>,
@@ -104,7 +108,7 @@ fn add_measurements(schema: &mut Schema) {
 }
 
 /// Fields of a box besides its measurements.
-const FIELDS: [&str; 6] = ["box", "class", "score", "scores", "object", "camera"];
+const FIELDS: [&str; 7] = ["box", "class", "score", "scores", "object", "camera", "ellipse"];
 
 /// A reading of the accelerometer.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
@@ -142,6 +146,7 @@ pub fn format_line(observation: &Observation) -> String {
             class: single.map(|(class, _)| class),
             object: detection.object,
             camera: Some(detection.camera.name.clone()).filter(|_| detection.camera.index > 0),
+            ellipse: detection.ellipse,
             quantities: detection.quantities.to_fields().collect(),
         }
     };
@@ -300,8 +305,9 @@ impl LineBox {
         let single = self.class.map(|class| (class, self.score.get()));
         let scores: ClassScores = self.scores.into_iter().chain(single).collect();
         let quantities = Quantities::read(self.quantities, &FIELDS)?;
-        let Self { object, bounding_box, .. } = self;
-        Ok(Detection { frame: 0, object, scores, camera, bounding_box, quantities })
+        let Self { object, bounding_box, ellipse, .. } = self;
+        ellipse.map_or(Ok(()), |ellipse| ellipse.check(&bounding_box))?;
+        Ok(Detection { frame: 0, object, scores, camera, bounding_box, quantities, ellipse })
     }
 }
 
@@ -319,6 +325,30 @@ mod tests {
 
     fn parse(line: &[u8]) -> Result<Observation, String> {
         super::parse(line, &cameras())
+    }
+
+    #[test]
+    fn an_ellipse_is_read_back_as_written_and_has_to_fit_its_box() {
+        let line = |ellipse: &str| {
+            let seen = format!(r#"{{"box": [60.0, 70.0, 140.0, 90.0], "ellipse": {ellipse}}}"#);
+            format!(
+                r#"{{"timestamp": 1.0, "pose": {{"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}, "boxes": [{seen}]}}"#
+            )
+        };
+        let read =
+            parse(line(r#"{"centre": [100, 80], "semi_axes": [39, 11], "angle": 0.05}"#).as_bytes()).unwrap();
+        let again = parse(format_line(&read).as_bytes()).unwrap();
+        assert!(read.detections[0].ellipse.is_some() && again.detections == read.detections);
+        let faults = [
+            (r#"{"centre": [100, 80], "semi_axes": [78, 22]}"#, "half of the diameters"),
+            (r#"{"centre": [100, 80], "semi_axes": [39, -1]}"#, "number above zero"),
+            (r#"{"center": [100, 80], "semi_axes": [39, 11]}"#, "unknown field `center`"),
+        ];
+        for (ellipse, words) in faults {
+            let read = parse(line(ellipse).as_bytes()).unwrap();
+            let UnusedInput::Box { fault, .. } = &read.unused[0] else { panic!() };
+            assert!(fault.contains(words), "{fault}");
+        }
     }
 
     #[test]
