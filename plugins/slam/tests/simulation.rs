@@ -98,10 +98,10 @@ fn errors_are_as_large_as_covariances_say_where_the_noise_is_known() {
 #[test]
 fn ellipses_of_outlines_replace_boxes_unless_the_border_cuts_them() {
     let text = r#"
-source = { type = "simulated", scene = { objects = 8 }, trajectory = { frames = 60 }, detector = { ellipse_error = 1.0 } }
+source = { type = "simulated", scene = { objects = 8 }, trajectory = { frames = 60 } }
 odometry = { noise = { sigma = 0.005 } }
 detections = { noise = { sigma = 2.0 }, ellipse_error = 1.0, border_px = 0.5, cut_sides = "mask" }
-variants = [{ name = "ellipses" }, { name = "boxes", set = { source = { type = "simulated", scene = { objects = 8 }, trajectory = { frames = 60 } } } }]
+variants = [{ name = "ellipses", set = { source = { detector = { ellipse_error = 1.0 } } } }, { name = "boxes" }]
 "#;
     let document = RunDocument::read(&Document::parse("run.toml", text, Format::Toml).unwrap()).unwrap();
     let mut run = Run::new(&document, None);
