@@ -10,9 +10,9 @@ const SMALLEST_HORIZONTAL: f64 = 1e-6;
 /// to the horizontal plane.
 ///
 /// One row, atan2(up · (zero × a), zero · a) - h in radians, counter-clockwise seen from above and wrapped to
-/// -π..π, where it jumps. In a map with x to the east, the defaults give the yaw of a body with x forward; a compass
-/// heading, clockwise from the north, is `heading` = π/2 - compass. Invariant to moving the pose and to tilting the axis. Not
-/// defined if the axis is vertical within 1e-6 radians.
+/// -π..π, where it jumps. With the defaults it is the yaw of a robot. If x of the map points to the east, a compass, clockwise
+/// from the north, measures π/2 - h. Invariant to moving the pose, and to raising or lowering the axis. Not defined if the
+/// axis is vertical within 1e-6 radians.
 ///
 /// ```toml
 /// [[factors]]
@@ -24,7 +24,7 @@ const SMALLEST_HORIZONTAL: f64 = 1e-6;
 #[serde(deny_unknown_fields)]
 pub struct Heading {
     heading: Angle,
-    /// Axis of the pose, in its own frame. Default: x, forward on a robot; z for a camera.
+    /// Axis of the pose, in its own frame. Default: x, which is forward on a robot; a camera looks along z.
     #[serde(default = "x")]
     pub axis: Direction,
     /// World direction with heading zero. Default: x.
