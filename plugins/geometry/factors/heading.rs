@@ -23,6 +23,7 @@ const SMALLEST_HORIZONTAL: f64 = 1e-6;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Heading {
+    /// Measured heading h, counter-clockwise. Unit: radians.
     heading: Angle,
     /// Axis of the pose, in its own frame. Default: x, which is forward on a robot; a camera looks along z.
     #[serde(default = "x")]

@@ -33,6 +33,7 @@ __all__ = [
     "conic_distance",
     "constant_velocity",
     "expression",
+    "heading_se3",
     "horizontal_orientation",
     "horizontal_orientation_smooth",
     "imu",
@@ -662,6 +663,37 @@ def expression(
         domain: Formulas that must be positive for the factor to be defined.
     """
     return Factor("expression", {"variables": variables, "residual": residual, "define": define, "constants": constants, "up": up, "domain": domain})
+
+
+def heading_se3(
+    *,
+    heading: float,
+    axis: Numbers | None = None,
+    zero: Numbers | None = None,
+    up: Numbers | None = None,
+) -> Factor:
+    """An axis of the pose has the heading h: the angle about `up` from the direction `zero` to the axis a = R `axis`, both projected
+    to the horizontal plane.
+
+    One row, atan2(up · (zero × a), zero · a) - h in radians, counter-clockwise seen from above and wrapped to
+    -π..π, where it jumps. With the defaults it is the yaw of a robot. If x of the map points to the east, a compass, clockwise
+    from the north, measures π/2 - h. Invariant to moving the pose, and to raising or lowering the axis. Not defined if the
+    axis is vertical within 1e-6 radians.
+
+    ```toml
+    [[factors]]
+    keys = ["x0"]
+    factor = { type = "heading_se3", heading = 1.2 }
+    noise = { sigma = 0.05 }
+    ```
+
+    Args:
+        heading: Measured heading h, counter-clockwise. Unit: radians.
+        axis: Axis of the pose, in its own frame. Default: x, which is forward on a robot; a camera looks along z.
+        zero: World direction with heading zero. Default: x.
+        up: The world's up direction. Default: z.
+    """
+    return Factor("heading_se3", {"heading": heading, "axis": axis, "zero": zero, "up": up})
 
 
 def horizontal_orientation(*, up: Numbers | None = None) -> Factor:
