@@ -689,7 +689,8 @@ def heading_se3(
 
     Args:
         heading: Measured heading h, counter-clockwise. Unit: radians.
-        axis: Axis of the pose, in its own frame. Default: x, which is forward on a robot; a camera looks along z.
+        axis: Axis of the pose, in its own frame. Default: x, which is forward on a robot; a camera looks
+            along z.
         zero: World direction with heading zero. Default: x.
         up: The world's up direction. Default: z.
     """
