@@ -45,10 +45,11 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
 
 /// Returns the first names after `crate::` in the imports and paths of a file, without comments and tests.
 fn named(source: &str) -> BTreeSet<String> {
-    let code: String = source
-        .split("#[cfg(test)]\nmod")
-        .next()
-        .unwrap_or_default()
+    // a module of tests in a file of its own ends nothing
+    let is_block =
+        |(at, _): &(usize, &str)| source[*at..].lines().nth(1).is_some_and(|line| line.ends_with('{'));
+    let tests = source.match_indices("#[cfg(test)]\nmod").find(is_block).map_or(source.len(), |(at, _)| at);
+    let code: String = source[..tests]
         .lines()
         .map(|line| line.split("//").next().unwrap_or_default().to_owned() + "\n")
         .collect();

@@ -50,7 +50,7 @@ impl Watch {
 
     fn flow(&mut self, looked: PyResult<bool>) -> ControlFlow<()> {
         match looked {
-            Ok(true) if !crate::raised::has_raised() => ControlFlow::Continue(()),
+            Ok(true) if self.raised.is_none() && !crate::raised::has_raised() => ControlFlow::Continue(()),
             Ok(_) => ControlFlow::Break(()),
             Err(error) => {
                 self.raised = Some(error);

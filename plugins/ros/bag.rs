@@ -48,6 +48,18 @@ pub enum BagError {
     },
 }
 
+impl BagError {
+    /// Returns the error as that of another file, of which this one is a copy.
+    fn of_file(self, file: &Path) -> Self {
+        let path = file.to_owned();
+        match self {
+            Self::Io { source, .. } => Self::Io { path, source },
+            Self::Format { found, .. } => Self::Format { path, found },
+            Self::Database { source, .. } => Self::Database { path, source },
+        }
+    }
+}
+
 /// A topic of a recording.
 #[derive(Debug)]
 pub struct Topic {
@@ -103,20 +115,16 @@ impl Ending {
 /// # Errors
 /// If a file cannot be read or has another format, or a folder has no recording.
 pub fn read(path: &Path, mut visit: impl FnMut(BagMessage<'_>)) -> Result<Ending, BagError> {
-    let mut ending = Ending::Complete;
+    let mut faults = vec![];
     for file in folder::files(path)? {
-        let found = read_file(&file, &mut visit)?;
-        // the first fault; the other files are read nevertheless
-        if ending == Ending::Complete {
-            ending = match found {
-                Ending::Fault(fault) if file != *path => {
-                    Ending::Fault(format!("{}: {fault}", file.display()))
-                }
-                found => found,
-            };
+        match read_file(&file, &mut visit)? {
+            // the other files are read nevertheless
+            Ending::Fault(fault) if file != *path => faults.push(format!("{}: {fault}", file.display())),
+            Ending::Fault(fault) => faults.push(fault),
+            Ending::Complete => {}
         }
     }
-    Ok(ending)
+    Ok(if faults.is_empty() { Ending::Complete } else { Ending::Fault(faults.join("; ")) })
 }
 
 fn read_file(path: &Path, visit: &mut dyn FnMut(BagMessage<'_>)) -> Result<Ending, BagError> {
@@ -130,17 +138,15 @@ fn read_file(path: &Path, visit: &mut dyn FnMut(BagMessage<'_>)) -> Result<Endin
                 Err(fault) if plain.as_file().metadata().map_err(io)?.len() == 0 => return Err(io(fault)),
                 ended => ended.err(),
             };
-            let named = |error| match error {
-                BagError::Format { found, .. } => BagError::Format { path: path.to_owned(), found },
-                other => other,
+            let ending = match format(plain.path()) {
+                Ok(FileFormat::Zstd) => {
+                    let found = "a file compressed twice by zstd";
+                    return Err(BagError::Format { path: path.to_owned(), found });
+                }
+                Ok(_) => read_file(plain.path(), visit),
+                Err(error) => Err(error),
             };
-            if matches!(format(plain.path()).map_err(named)?, FileFormat::Zstd) {
-                return Err(BagError::Format {
-                    path: path.to_owned(),
-                    found: "a file compressed twice by zstd",
-                });
-            }
-            let ending = read_file(plain.path(), visit)?;
+            let ending = ending.map_err(|error| error.of_file(path))?;
             // a file that is cut off is read up to there
             Ok(fault.map_or(ending, |fault| {
                 Ending::Fault(format!("it cannot be decompressed completely: {fault}"))

@@ -21,9 +21,11 @@ use schemars::generate::SchemaSettings;
 use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, ErrorKind, Read};
 use std::path::Path;
 
+/// Start of the name of the program in the header of a file.
+const LIBRARY: &str = "manifactor ";
 /// Opacity of ellipsoids.
 const OPACITY: f64 = 0.6;
 
@@ -53,15 +55,20 @@ impl SceneRecording {
     /// Creates the file.
     ///
     /// # Errors
-    /// If the file exists, unless `overwrite` is set, or cannot be written.
+    /// If the file exists, unless `overwrite` is set and it is a map that was written here, or cannot be written.
     pub fn create(file: &Path, overwrite: bool) -> io::Result<Self> {
-        let created = match overwrite {
-            true => File::create(file),
-            false => File::create_new(file),
+        let created = match File::create_new(file) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists && overwrite => {
+                if !is_map(file)? {
+                    return Err(io::Error::other("it is not a map that was written here, so it stays"));
+                }
+                File::create(file)
+            }
+            created => created,
         };
         // with threads of its own, the size of chunks could depend on the machine
         let options = WriteOptions::new()
-            .library(concat!("manifactor ", env!("CARGO_PKG_VERSION")))
+            .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
             .compression_threads(0);
         let writer = options.create(BufWriter::new(created?)).map_err(io_error)?;
@@ -214,6 +221,15 @@ impl SceneRecording {
         let data = serde_json::to_vec(message).map_err(|error| McapError::Io(error.into()))?;
         self.writer.write_to_known_channel(&header, &data)
     }
+}
+
+/// Returns whether a file is such a map, by the header of MCAP, or is empty.
+fn is_map(file: &Path) -> io::Result<bool> {
+    // magic bytes, kind and length of the first record, lengths of an empty profile and of the library
+    const BEFORE_LIBRARY: usize = 8 + 1 + 8 + 4 + 4;
+    let mut start = vec![];
+    File::open(file)?.take((BEFORE_LIBRARY + LIBRARY.len()) as u64).read_to_end(&mut start)?;
+    Ok(start.is_empty() || start.starts_with(mcap::MAGIC) && start.ends_with(LIBRARY.as_bytes()))
 }
 
 fn io_error(error: McapError) -> io::Error {

@@ -18,7 +18,7 @@ impl Content {
     /// kind that is not expected is an error that names the command for it.
     pub(crate) fn open(path: &Path, expected: Expected) -> Result<Self, Failure> {
         expected.refuse_folder(path)?;
-        expected.check(path, InputKind::of_extension(path))?;
+        expected.check(path, InputKind::of_path(path))?;
         if Format::of_path(path).is_some() {
             let document = Document::open(path).map_err(|error| frames_or(error, path, expected))?;
             expected.check(path, InputKind::of_document(&document))?;

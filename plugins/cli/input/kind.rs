@@ -55,7 +55,7 @@ impl InputKind {
     }
 
     /// Returns the kind of a file that is no text, by its extension, or of a folder of such files; `None` for others.
-    pub(crate) fn of_extension(path: &Path) -> Option<Self> {
+    pub(crate) fn of_path(path: &Path) -> Option<Self> {
         let is_of_ros_1 = path.extension().is_some_and(|extension| extension == "bag");
         (is_of_ros_1 || is_recording(path)).then_some(Self::Mcap)
     }

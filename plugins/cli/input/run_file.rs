@@ -24,7 +24,7 @@ pub(crate) struct RunArguments {
 impl RunArguments {
     /// Reads the document.
     pub(crate) fn open(&self) -> Result<RunDocument, Failure> {
-        if InputKind::of_extension(&self.config) == Some(InputKind::Mcap) {
+        if InputKind::of_path(&self.config) == Some(InputKind::Mcap) {
             return self.read(recording::document(&self.config)?);
         }
         self.read(document::open(&self.config, kind::RUN)?)

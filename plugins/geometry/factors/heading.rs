@@ -12,7 +12,7 @@ const SMALLEST_HORIZONTAL: f64 = 1e-6;
 /// One row, atan2(up · (zero × a), zero · a) - h in radians, counter-clockwise seen from above and wrapped to
 /// -π..π, where it jumps. With the defaults it is the yaw of a robot. If x of the map points to the east, a compass, clockwise
 /// from the north, measures π/2 - h. Invariant to moving the pose, and to raising or lowering the axis. Not defined if the
-/// axis is vertical within 1e-6 radians.
+/// axis or `zero` is vertical within 1e-6 radians.
 ///
 /// ```toml
 /// [[factors]]

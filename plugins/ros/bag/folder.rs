@@ -1,5 +1,6 @@
 //! Recordings in several files of one folder.
 use super::BagError;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Extensions of recordings.
@@ -7,7 +8,7 @@ const EXTENSIONS: [&str; 2] = ["mcap", "db3"];
 
 /// Returns whether a path is a recording by its extension, or a folder with such a file.
 pub fn is_recording(path: &Path) -> bool {
-    if path.is_dir() { files(path).is_ok() } else { has_extension(path) }
+    if path.is_dir() { !recordings(path).unwrap_or_default().is_empty() } else { has_extension(path) }
 }
 
 /// Returns whether the extension is that of a recording, or of one compressed by zstd.
@@ -24,38 +25,48 @@ fn without_compression(path: &Path) -> PathBuf {
     }
 }
 
-/// Returns the files of a recording: the file itself, or those of a folder by the number at the end of their names.
-///
-/// # Errors
-/// If the folder cannot be read, or has no recording.
-pub(super) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
-    if !path.is_dir() {
-        return Ok(vec![path.to_owned()]);
-    }
-    let io = |source| BagError::Io { path: path.to_owned(), source };
+/// Returns the files in a folder that are recordings by their extension.
+fn recordings(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut files = vec![];
-    for entry in std::fs::read_dir(path).map_err(io)? {
-        let file = entry.map_err(io)?.path();
+    for entry in std::fs::read_dir(folder)? {
+        let file = entry?.path();
         if has_extension(&file) && file.is_file() {
             files.push(file);
         }
     }
+    Ok(files)
+}
+
+/// Returns the files of a recording: the file itself, or those of a folder by the number at the end of their names.
+///
+/// # Errors
+/// If the folder cannot be read, or does not have exactly one recording.
+pub(super) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let mut files = recordings(path).map_err(|source| BagError::Io { path: path.to_owned(), source })?;
     if files.is_empty() {
         return Err(BagError::Format {
             path: path.to_owned(),
             found: "a folder without `.mcap` or `.db3` files",
         });
     }
-    files.sort_by_key(|file| (number(file), file.clone()));
+    let names: BTreeSet<String> = files.iter().map(|file| split_name(file).0).collect();
+    if names.len() > 1 {
+        let found = "a folder with several recordings; give one of its files";
+        return Err(BagError::Format { path: path.to_owned(), found });
+    }
+    files.sort_by_key(|file| (split_name(file).1, file.clone()));
     Ok(files)
 }
 
-/// Returns the number at the end of a name, such as 12 in `drive_12.mcap`.
-fn number(file: &Path) -> u64 {
+/// Returns the name of a recording and the number of its file, such as `drive_` and 12 for `drive_12.mcap`.
+fn split_name(file: &Path) -> (String, u64) {
     let plain = without_compression(file);
     let stem = plain.file_stem().unwrap_or_default().to_string_lossy();
-    let digits = stem.rsplit(|c: char| !c.is_ascii_digit()).next().unwrap_or_default();
-    digits.parse().unwrap_or(0)
+    let name = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+    (name.to_owned(), stem[name.len()..].parse().unwrap_or(0))
 }
 
 #[cfg(test)]
@@ -77,5 +88,9 @@ mod tests {
                 && !is_recording(Path::new("a.csv"))
         );
         assert!(!is_recording(tempfile::tempdir().unwrap().path()));
+        // two drives are not one
+        std::fs::write(folder.path().join("other_0.mcap"), "").unwrap();
+        let error = super::files(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("several recordings") && is_recording(folder.path()), "{error}");
     }
 }

@@ -43,7 +43,7 @@ pub(super) fn read(path: &Path, visit: &mut dyn FnMut(BagMessage<'_>)) -> Result
             None => return Ok(Ending::Complete),
         },
         Ok(Some(fault)) => fault,
-        Err(error) => error.to_string(),
+        Err(error) => format!("the database is damaged or cut off: {error}"),
     };
     Ok(Ending::after(messages, &fault))
 }

@@ -103,15 +103,7 @@ mod tests {
         let scores = ClassScores::default();
         let model = Camera::new([500.0, 500.0, 320.0, 240.0], 640, 480).unwrap();
         let camera = Cameras::new(model).first().clone();
-        let detection = Detection {
-            frame: 4,
-            object: None,
-            scores,
-            camera,
-            bounding_box,
-            quantities: manifactor_recording::measurement::Quantities::NONE,
-            ellipse: None,
-        };
+        let detection = Detection { frame: 4, ..Detection::new(camera, bounding_box, scores) };
         let put = |from, into| {
             let (from, into) = (ObjectId(from), ObjectId(into));
             DetectionMove { frame: 4, index: 1, from, into, detection: detection.clone() }

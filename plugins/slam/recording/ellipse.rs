@@ -35,12 +35,16 @@ impl ImageEllipse {
         })
     }
 
-    /// Returns A, in px².
-    pub fn shape(&self) -> Matrix2<f64> {
+    /// Returns the symmetric square root of A, in px.
+    pub fn root(&self) -> Matrix2<f64> {
         let (sin, cos) = self.angle.sin_cos();
         let axes = Matrix2::new(cos, -sin, sin, cos);
-        let squares = Vector2::from(self.semi_axes.map(|axis| axis.get().powi(2)));
-        axes * Matrix2::from_diagonal(&squares) * axes.transpose()
+        axes * Matrix2::from_diagonal(&Vector2::from(self.semi_axes.map(Positive::get))) * axes.transpose()
+    }
+
+    /// Returns A, in px².
+    pub fn shape(&self) -> Matrix2<f64> {
+        self.root() * self.root()
     }
 
     /// Returns the box around the ellipse.

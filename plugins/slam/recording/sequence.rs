@@ -254,6 +254,14 @@ pub struct Detection {
     pub ellipse: Option<ImageEllipse>,
 }
 
+impl Detection {
+    /// Creates a box in frame 0, of an unknown object and without further measurements.
+    pub fn new(camera: Arc<MountedCamera>, bounding_box: BoundingBox, scores: ClassScores) -> Self {
+        let quantities = Quantities::NONE;
+        Self { frame: 0, object: None, scores, camera, bounding_box, quantities, ellipse: None }
+    }
+}
+
 /// Scores of a detector by class, each from 0 to 1; classes that are not listed score 0. Classes with scores
 /// outside of this range are dropped.
 #[derive(Debug, Clone, Default, PartialEq)]

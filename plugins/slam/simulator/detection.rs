@@ -5,11 +5,8 @@ use super::scene::SceneObject;
 use super::solid::ImageBoxes;
 use super::{SimulatedSource, catalogue, noise};
 use manifactor_geometry::Se3;
-use manifactor_quadric::{BoundingBox, Camera};
 use manifactor_recording::camera::MountedCamera;
-use manifactor_recording::ellipse::ImageEllipse;
-use manifactor_recording::measurement::Quantities;
-use manifactor_recording::sequence::{ClassScores, Detection};
+use manifactor_recording::sequence::Detection;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::sync::Arc;
@@ -36,18 +33,9 @@ impl DetectorErrors {
 
 /// Camera pose of an image, and its depth image if objects hide each other.
 struct ImageView<'a> {
-    camera: &'a Camera,
+    camera: &'a Arc<MountedCamera>,
     pose: &'a Se3,
     depths: Option<DepthImage>,
-}
-
-/// A box of an object, and the object that it is assigned to.
-struct SimulatedBox {
-    bounding_box: BoundingBox,
-    scores: ClassScores,
-    quantities: Quantities,
-    ellipse: Option<ImageEllipse>,
-    assigned_to: usize,
 }
 
 impl SimulatedSource {
@@ -77,7 +65,7 @@ impl SimulatedSource {
             let there = (0..usual.len()).map(|i| scene.object_at(i, time));
             let solids = there.map(|o| (&o.solid, pose.between(&o.truth.world_from_object)));
             let depths = self.detector.occluded_by_objects.then(|| DepthImage::new(solids, &camera.model));
-            let view = ImageView { camera: &camera.model, pose: &pose, depths };
+            let view = ImageView { camera, pose: &pose, depths };
             for (i, object) in scene.objects.iter().enumerate() {
                 let class = (usual[i], classes.as_slice());
                 // an object draws noise even after it has moved away, so that a move changes only its own
@@ -86,48 +74,22 @@ impl SimulatedSource {
                 if let Some(moved) = scene.moved_object(i, time) {
                     seen = self.detect_object(i, moved, &view, class, &mut after);
                 }
-                if let Some(SimulatedBox {
-                    bounding_box,
-                    scores,
-                    quantities,
-                    ellipse,
-                    assigned_to: taken_for,
-                }) = seen
-                {
-                    let object = Some(scene.object_at(taken_for, time).truth.id);
-                    let camera = camera.clone();
-                    detections.push(Detection {
-                        frame,
-                        object,
-                        scores,
-                        camera,
-                        bounding_box,
-                        quantities,
-                        ellipse,
-                    });
-                }
+                detections.extend(seen.map(|(assigned_to, detection)| Detection {
+                    frame,
+                    object: Some(scene.object_at(assigned_to, time).truth.id),
+                    ..detection
+                }));
             }
             for (bounding_box, scores) in self.detector.draw_false_boxes(&camera.model, &classes, imagination)
             {
-                let quantities = Quantities::NONE;
-                let camera = camera.clone();
-                let (object, ellipse) = (None, None);
-                detections.push(Detection {
-                    frame,
-                    object,
-                    scores,
-                    camera,
-                    bounding_box,
-                    quantities,
-                    ellipse,
-                });
+                detections.push(Detection { frame, ..Detection::new(camera.clone(), bounding_box, scores) });
             }
         }
         detections
     }
 
-    /// Simulates the detection of one object; `None` if it is not detected. `usual` is the class that the
-    /// detector usually reports.
+    /// Simulates the detection of one object in frame 0, with the index of the object that it is assigned to; `None` if it is
+    /// not detected. `usual` is the class that the detector usually reports.
     fn detect_object(
         &self,
         i: usize,
@@ -135,25 +97,27 @@ impl SimulatedSource {
         view: &ImageView<'_>,
         (usual, classes): (&str, &[&str]),
         DetectorErrors { boxes, mistakes, depths, lasting }: &mut DetectorErrors,
-    ) -> Option<SimulatedBox> {
+    ) -> Option<(usize, Detection)> {
         let objects = lasting.len();
         let (noise, seconds) = &mut lasting[i];
         *seconds += *self.trajectory.interval;
         let world_from_object = &object.truth.world_from_object;
-        let ImageBoxes { whole, inside } = object.solid.boxes(world_from_object, view.camera, view.pose)?;
+        let ImageBoxes { whole, inside } =
+            object.solid.boxes(world_from_object, &view.camera.model, view.pose)?;
         let left = view.depths.as_ref().map_or(Some((inside, 1.0)), |depths| depths.visible_part(i, inside));
         // a hidden object draws noise as well, so that a setting changes only its own effect
         let (seen, share) = left.unwrap_or((inside, 0.0));
         let visible = share * inside.area() / whole.area();
-        let drawn = self.detector.draw_box(&seen, visible, view.camera, (noise, *seconds), boxes);
+        let drawn = self.detector.draw_box(&seen, visible, &view.camera.model, (noise, *seconds), boxes);
         *seconds = 0.0;
         let scores = self.detector.draw_class(usual, classes, boxes);
         let taken_for = noise::draw_assigned_object(*self.detector.wrong_object, i, objects, mistakes);
         let away = view.pose.inverse().act(&world_from_object.translation).z;
         let quantities = self.detector.draw_measurements(away, depths);
-        let outline = object.solid.outline(&view.pose.between(world_from_object), view.camera);
+        let outline = object.solid.outline(&view.pose.between(world_from_object), &view.camera.model);
         let ellipse = self.detector.draw_ellipse(outline, depths);
         let bounding_box = drawn.filter(|_| left.is_some())?;
-        Some(SimulatedBox { bounding_box, scores, quantities, ellipse, assigned_to: taken_for })
+        let detection = Detection::new(view.camera.clone(), bounding_box, scores);
+        Some((taken_for, Detection { quantities, ellipse, ..detection }))
     }
 }

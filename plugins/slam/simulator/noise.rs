@@ -6,7 +6,7 @@ use manifactor_quadric::{BoundingBox, Camera};
 use manifactor_recording::ellipse::ImageEllipse;
 use manifactor_recording::measurement::{DepthMeasurement, Quantities};
 use manifactor_recording::sequence::ClassScores;
-use nalgebra::{Matrix2, SymmetricEigen, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix2, Vector2, Vector3, Vector6};
 use rand::RngExt;
 use rand_distr::{Distribution, Poisson, StandardNormal};
 use rand_pcg::Pcg64;
@@ -244,12 +244,8 @@ impl DetectorSettings {
         let [x, y, a, b, c] = [(); 5].map(|()| sigma * normal(rng));
         let outline = outline?;
         // noise of the square root of the shape is noise of the semi-axes
-        let shape = outline.shape();
-        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(shape);
-        let root =
-            eigenvectors * Matrix2::from_diagonal(&eigenvalues.map(f64::sqrt)) * eigenvectors.transpose();
         let off = c / std::f64::consts::SQRT_2;
-        let root = root + Matrix2::new(a, off, off, b);
+        let root = outline.root() + Matrix2::new(a, off, off, b);
         ImageEllipse::from_shape(Vector2::from(outline.centre) + Vector2::new(x, y), root * root.transpose())
     }
 

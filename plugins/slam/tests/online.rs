@@ -4,7 +4,6 @@ use manifactor_config::{Document, Format};
 use manifactor_geometry::Se3;
 use manifactor_quadric::BoundingBox;
 use manifactor_slam::mapping::Mapping;
-use manifactor_slam::measurement::Quantities;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::{MappedFrame, Run, StreamEvent, StreamWatcher};
@@ -261,16 +260,10 @@ fn rejected_boxes_are_reported_and_the_pose_is_accepted() {
     let id = keys.iter().find_map(|(key, _)| key.as_str().strip_prefix('q')?.parse().ok()).unwrap();
     let mut frame = sequence.frames.last().unwrap().clone();
     frame.timestamp += 1.0;
-    let far = Detection {
-        frame: 0,
-        object: Some(ObjectId(id)),
-        camera: sequence.cameras.first().clone(),
-        scores: ClassScores::single("cup", 0.5),
-        // its square is infinite
-        quantities: Quantities::NONE,
-        ellipse: None,
-        bounding_box: BoundingBox { xmin: 1e200, ymin: 1e200, xmax: 2e200, ymax: 2e200 },
-    };
+    // its square is infinite
+    let bounding_box = BoundingBox { xmin: 1e200, ymin: 1e200, xmax: 2e200, ymax: 2e200 };
+    let (camera, scores) = (sequence.cameras.first().clone(), ClassScores::single("cup", 0.5));
+    let far = Detection { object: Some(ObjectId(id)), ..Detection::new(camera, bounding_box, scores) };
     let measured = mapper.measurements().clone();
     let taken = mapper.add_frame(&Observation { detections: vec![far], ..Observation::new(frame) }).unwrap();
     assert!(taken.refused.len() == 1 && taken.refused[0].starts_with("the boxes at"), "{:?}", taken.refused);

@@ -75,6 +75,22 @@ fn a_viewer_gets_the_growing_map_and_the_final_one() {
 }
 
 #[test]
+fn only_a_map_is_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("drive.mcap");
+    let other = WriteOptions::new().library("recorder").create(File::create(&recording).unwrap()).unwrap();
+    drop(other);
+    let before = std::fs::read(&recording).unwrap();
+    let error = SceneRecording::create(&recording, true).unwrap_err().to_string();
+    assert!(error.contains("not a map"), "{error}");
+    assert_eq!(std::fs::read(&recording).unwrap(), before);
+    let map = folder.path().join("map.mcap");
+    for overwrite in [false, true, true] {
+        SceneRecording::create(&map, overwrite).unwrap().finish().unwrap();
+    }
+}
+
+#[test]
 fn times_before_the_epoch_are_the_epoch() {
     assert_eq!((Time::nanoseconds(-1.0), Time::nanoseconds(1.5)), (0, 1_500_000_000));
     assert_eq!(Time::of(1.25).nsec, 250_000_000);

@@ -104,12 +104,9 @@ pub(super) fn run(arguments: Arguments) -> BenchmarkResult {
         recorded.detections.push(Detection {
             frame,
             object,
-            scores,
-            camera: camera.clone(),
-            bounding_box,
-            ellipse: None,
             quantities: Positive::new(n[12])
                 .map_or(Quantities::NONE, |z| Quantities::one(DepthMeasurement(z))),
+            ..Detection::new(camera.clone(), bounding_box, scores)
         });
     }
     recorded.detections.sort_by_key(|detection| detection.frame);

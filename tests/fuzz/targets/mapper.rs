@@ -103,18 +103,16 @@ fn observations(text: &str) -> Vec<Observation> {
             }
             ("box", Some(last)) if last.detections.len() < LONGEST => {
                 let [xmin, ymin, xmax, ymax] = std::array::from_fn(|i| number(2 + i));
+                let camera = Cameras::new(super::stream::camera()).first().clone();
+                let bounding_box = BoundingBox { xmin, ymin, xmax, ymax };
                 last.detections.push(Detection {
-                    frame: 0,
                     object: word(1).parse().ok().map(ObjectId),
-                    scores: ClassScores::single(word(7), number(6)),
-                    camera: Cameras::new(super::stream::camera()).first().clone(),
-                    bounding_box: BoundingBox { xmin, ymin, xmax, ymax },
-                    ellipse: None,
                     quantities: word(8)
                         .parse()
                         .ok()
                         .and_then(|depth| Positive::new(depth).ok())
                         .map_or(Quantities::NONE, |depth| Quantities::one(DepthMeasurement(depth))),
+                    ..Detection::new(camera, bounding_box, ClassScores::single(word(7), number(6)))
                 });
             }
             ("feel", Some(last)) => {

@@ -305,14 +305,11 @@ mod tests {
     use manifactor_recording::sequence::ClassScores;
 
     fn detection(frame: usize, object: u32, class: &str, score: f64, bounds: [f64; 4]) -> Detection {
+        let (camera, bounding_box) = (sequence().cameras.first().clone(), BoundingBox::new(bounds).unwrap());
         Detection {
             frame,
             object: Some(ObjectId(object)).filter(|_| object > 0),
-            scores: ClassScores::single(class, score),
-            camera: sequence().cameras.first().clone(),
-            bounding_box: BoundingBox::new(bounds).unwrap(),
-            quantities: Quantities::NONE,
-            ellipse: None,
+            ..Detection::new(camera, bounding_box, ClassScores::single(class, score))
         }
     }
 

@@ -175,17 +175,14 @@ pub(super) fn detection(row: &DetectionRow, camera: &Arc<MountedCamera>) -> Dete
         // cannot happen: the reader has checked the scores
         Err(_) => ClassScores::single(row.class_name.clone(), row.score),
     };
+    let bounding_box = BoundingBox { xmin: row.xmin, ymin: row.ymin, xmax: row.xmax, ymax: row.ymax };
     Detection {
-        frame: 0,
         object: row.object_key.filter(|key| *key != 0).map(ObjectId),
-        scores,
-        camera: camera.clone(),
-        bounding_box: BoundingBox { xmin: row.xmin, ymin: row.ymin, xmax: row.xmax, ymax: row.ymax },
         quantities: row
             .depth
             .and_then(|depth| Positive::new(depth).ok())
             .map_or(Quantities::NONE, |depth| Quantities::one(DepthMeasurement(depth))),
-        ellipse: None,
+        ..Detection::new(camera.clone(), bounding_box, scores)
     }
 }
 

@@ -105,7 +105,7 @@ fn append_frame(journal: &mut Journal<Observation>, frame: &Observation) -> io::
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurement::Quantities;
+
     use crate::sequence::{ClassScores, Detection, Frame, ObjectId, SequenceHeader};
     use manifactor_geometry::Se3;
     use manifactor_quadric::{BoundingBox, Camera};
@@ -121,14 +121,11 @@ mod tests {
             sequence.frames.push(Frame::new(10.0 + t, world_from_camera));
             for (object, left) in [(1, 100.0), (2, 300.0)] {
                 let bounding_box = BoundingBox::new([left + 3.0 * t, 120.0, left + 80.5, 200.0 + t]).unwrap();
+                let (camera, scores) = (sequence.cameras.first().clone(), ClassScores::single("cup", 0.7));
                 sequence.detections.push(Detection {
                     frame: sequence.frames.len() - 1,
-                    bounding_box,
-                    camera: sequence.cameras.first().clone(),
-                    scores: ClassScores::single("cup", 0.7),
                     object: Some(ObjectId(object)),
-                    quantities: Quantities::default(),
-                    ellipse: None,
+                    ..Detection::new(camera, bounding_box, scores)
                 });
             }
         }

@@ -440,9 +440,7 @@ impl Mcap {
             named.cloned().unwrap_or(class)
         };
         let scores: ClassScores = scores.into_iter().map(|(class, score)| (name(class), score)).collect();
-        let quantities = crate::measurement::Quantities::NONE;
-        let camera = camera.clone();
-        Ok(Detection { frame: 0, object: None, scores, camera, bounding_box, quantities, ellipse: None })
+        Ok(Detection::new(camera.clone(), bounding_box, scores))
     }
 }
 
