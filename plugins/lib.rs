@@ -50,9 +50,17 @@
 //!         Vector1::new(point.norm() - self.radius)
 //!     }
 //! }
+//!
+//! let (mut graph, mut values) = (Graph::new(), Values::new());
+//! graph.add(["p"], Unnamed(OnCircle { radius: 2.0 }));
+//! values.insert("p", Point2::new([1.0, 1.0]));
+//! let solution = solve(&graph, &values, &Auto::default(), &mut Silent)?;
+//! assert!((solution.values.get::<Point2>("p")?.0.norm() - 2.0).abs() < 1e-9);
+//! # assert!(manifactor::config::Format::Toml.write(&graph).is_err());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//! With serde's derives and one line, [`register_factor!`], a document can use it by name.
-//! `docs/authors-guide.md` continues with its documentation and its laws.
+//! With serde's derives and one line, [`register_factor!`], it needs no [`Unnamed`](prelude::Unnamed), and a
+//! document can use it by name. `docs/authors-guide.md` continues with its documentation and its laws.
 //!
 //! # Changing measurements in a loop
 //! A graph is compiled once. Measurements, noise and weights of the compiled [`Problem`](solve::Problem) can

@@ -3,6 +3,7 @@ pub mod batch;
 mod dynamic;
 pub mod invariance;
 mod kernel;
+mod unnamed;
 
 use crate::algebra::{Dimension, Direction};
 use crate::factor::batch::{Batch, BatchOf};
@@ -21,6 +22,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 pub use dynamic::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows};
+pub use unnamed::Unnamed;
 
 /// A registered residual. Implemented by [`register_factor!`](crate::register_factor).
 #[diagnostic::on_unimplemented(

@@ -261,6 +261,21 @@ impl Graph {
         self.resolve(values).err().unwrap_or_default()
     }
 
+    /// Returns the cost ½ Σ ρ(‖r‖²) at `values`. Factors that are undefined there do not count.
+    ///
+    /// # Errors
+    /// All errors between this graph and `values`.
+    pub fn cost(&self, values: &Values) -> Result<f64, Vec<GraphError>> {
+        self.resolve(values)?;
+        let cost = |entry: &FactorEntry| {
+            let points: Vec<_> =
+                entry.keys.iter().map(|key| values.variable(key.as_str())).collect::<Option<_>>()?;
+            let squared = entry.squared_at(&points)?;
+            Some(0.5 * entry.loss.as_ref().map_or(squared, |loss| loss.erased().rho(squared).0))
+        };
+        Ok(self.factors.iter().filter_map(cost).sum())
+    }
+
     /// Looks up the variables of every factor, and checks that all of them fit.
     ///
     /// # Errors
@@ -302,10 +317,15 @@ impl FactorEntry {
     /// `None` if a variable is missing or has the wrong type, or if the factor is undefined there.
     pub fn squared(&self, point: impl Fn(&Key) -> Option<Box<dyn Variable>>) -> Option<f64> {
         let points: Vec<Box<dyn Variable>> = self.keys.iter().map(point).collect::<Option<_>>()?;
-        let points: Vec<&dyn Variable> = points.iter().map(|point| &**point).collect();
+        self.squared_at(&points.iter().map(|point| &**point).collect::<Vec<_>>())
+    }
+
+    /// Returns the squared norm of the whitened residual at these values of its variables, as
+    /// [`squared`](Self::squared).
+    fn squared_at(&self, points: &[&dyn Variable]) -> Option<f64> {
         let residual = self.factor.erased();
-        residual.is_defined(&points).filter(|is_defined| *is_defined)?;
-        let r = residual.residual(&points)?;
+        residual.is_defined(points).filter(|is_defined| *is_defined)?;
+        let r = residual.residual(points)?;
         let whitener = self.noise.whitener(r.len()).ok()?.matrix(r.len());
         Some((whitener * DVector::from_vec(r)).norm_squared())
     }

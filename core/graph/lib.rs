@@ -21,7 +21,7 @@ pub use algebra::{
     Block, Dimension, Direction, Jet, JetOf, Lift, Matrix, NoDirection, Scalar, Up, Vector, abs,
 };
 pub use factor::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows, batch, invariance};
-pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, signature};
+pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, Unnamed, signature};
 pub use graph::{Fixed, Graph, GraphError, Resolved, VariableIndices, Version};
 pub use manifactor_document::TextError;
 pub use noise::Noise;

@@ -6,7 +6,7 @@ pub use crate::loss::{Loss, RobustLoss};
 pub use crate::quantity::Quantity;
 pub use crate::{
     Dimension, Direction, Factor, Graph, Jacobians, Jet, JetOf, Key, Lift, Lifted, Manifold, Many, Noise,
-    Refs, Residual, Scalar, Tangent, Up, Values, Variable, Variables, Vector, abs,
+    Refs, Residual, Scalar, Tangent, Unnamed, Up, Values, Variable, Variables, Vector, abs,
 };
 pub use crate::{
     register, register_factor, register_functions, register_invariance, register_loss, register_manifold,

@@ -1,16 +1,18 @@
 //! Registered types as Python objects: factors, losses, solvers, starts and values of variables.
 use crate::errors::{self, Mistake};
-use crate::input::{Untagged, array, json_to_python, node, numbers, to_array, to_python, unchangeable};
+use crate::input::{
+    Untagged, array, json_to_python, node, numbers, plain_node, to_array, to_python, unchangeable,
+};
 use crate::threads::detach;
-use manifactor::config::{Errors, Field, Node, Place, Value, nearest};
-use manifactor::graph::catalogue::{entries, find};
+use manifactor::config::{Errors, Field, Node, Place, Table, Value, nearest};
+use manifactor::graph::catalogue::{Entry, entries, find};
 use manifactor::graph::loss::Loss;
 use manifactor::graph::{Factor, Variable};
 use manifactor::solve::{Optimizer, Start};
 use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyAttributeError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyString};
 use serde_json::Value as Json;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -44,6 +46,7 @@ impl What {
         }
     }
 
+    /// Reads an object and adds all mistakes to `errors`. The node has the `type`.
     fn read(kind: &str, node: &Node, errors: &Errors) -> Option<Self> {
         match kind {
             "factor" => node.read::<Box<dyn Factor>>(errors).map(|x| Self::Factor(x.into())),
@@ -51,6 +54,18 @@ impl What {
             "solver" => node.read::<Box<dyn Optimizer>>(errors).map(|x| Self::Solver(x.into())),
             "start" => node.read::<Box<dyn Start>>(errors).map(|x| Self::Start(x.into())),
             "variable" => node.read::<Box<dyn Variable>>(errors).map(|x| Self::Variable(x.into())),
+            _ => None,
+        }
+    }
+
+    /// Reads an object of a known type from fields without mistakes; `None` if there is one.
+    fn of_entry(entry: &Entry, fields: &Node) -> Option<Self> {
+        match entry.kind {
+            "factor" => entry.read::<dyn Factor>(fields).ok().map(|x| Self::Factor(x.into())),
+            "loss" => entry.read::<dyn Loss>(fields).ok().map(|x| Self::Loss(x.into())),
+            "solver" => entry.read::<dyn Optimizer>(fields).ok().map(|x| Self::Solver(x.into())),
+            "start" => entry.read::<dyn Start>(fields).ok().map(|x| Self::Start(x.into())),
+            "variable" => entry.read::<dyn Variable>(fields).ok().map(|x| Self::Variable(x.into())),
             _ => None,
         }
     }
@@ -77,21 +92,7 @@ impl Chosen {
         if let Ok(other) = kind.cast::<Self>() {
             return Ok(Self(other.get().0.clone()));
         }
-        let (kind, name) = (kind.extract::<String>()?, name.unwrap_or_default());
-        known(&kind, name)?;
-        let mut table = manifactor::config::Table::default();
-        let field = |node| Field { key: Place::nowhere(), node };
-        table.insert("type".into(), field(Node::new(Place::nowhere(), Value::String(name.to_owned()))));
-        for (field_name, value) in fields.into_iter().flatten() {
-            if !value.is_none() {
-                let field_name: String = field_name.extract()?;
-                let value = node(name, &field_name, &value)?;
-                table.insert(field_name, Field { key: value.place.clone(), node: value });
-            }
-        }
-        let (node, errors) = (Node::new(Place::nowhere(), Value::Table(table)), Errors::new());
-        let what = What::read(&kind, &node, &errors);
-        errors.finish(what).map(Self).map_err(|diagnostics| errors::read(name, &diagnostics))
+        read(kind.cast::<PyString>()?.to_str()?, name.unwrap_or_default(), fields).map(Self)
     }
 
     /// Kind of the object: `"factor"`, `"loss"`, `"solver"`, `"start"` or `"variable"`.
@@ -188,6 +189,52 @@ impl Chosen {
     }
 }
 
+/// Reads an object from its fields, as in a document.
+fn read(kind: &str, name: &str, fields: Option<&Bound<'_, PyDict>>) -> PyResult<What> {
+    let entry = known(kind, name)?;
+    let given = || fields.into_iter().flatten().filter(|(_, value)| !value.is_none());
+    // only messages need places, so the fields are read without them first
+    let plain: Option<Table> = given()
+        .map(|(field, value)| {
+            let field = field.cast::<PyString>().ok()?.to_str().ok()?;
+            let node = plain_node(&value).filter(|_| field != "type")?;
+            Some((field.to_owned(), Field { key: Place::nowhere(), node }))
+        })
+        .collect::<Option<_>>()
+        .map(Box::new);
+    if let Some(what) = plain.and_then(|table| What::of_entry(entry, &nowhere(Value::Table(table)))) {
+        return Ok(what);
+    }
+    let mut table = Table::default();
+    let field = |node| Field { key: Place::nowhere(), node };
+    table.insert("type".into(), field(nowhere(Value::String(name.to_owned()))));
+    for (field_name, value) in given() {
+        let field_name: String = field_name.extract()?;
+        let value = node(name, &field_name, &value)?;
+        table.insert(field_name, Field { key: value.place.clone(), node: value });
+    }
+    let (node, errors) = (nowhere(Value::Table(table)), Errors::new());
+    let what = What::read(kind, &node, &errors);
+    errors.finish(what).map_err(|diagnostics| errors::read(name, &diagnostics))
+}
+
+/// Makes a factor whose only field is a value.
+pub(crate) fn factor_of_value(
+    name: &str,
+    field: &str,
+    value: &Arc<dyn Variable>,
+) -> PyResult<Arc<dyn Factor>> {
+    let entry = known("factor", name)?;
+    let node = Untagged(value.clone()).node(&Place::nowhere())?;
+    let table = Table::new([(field.to_owned(), Field { key: Place::nowhere(), node })].into_iter().collect());
+    let read = entry.read::<dyn Factor>(&nowhere(Value::Table(table)));
+    read.map(Arc::from).map_err(|error| errors::argument(name, field, error.fault()))
+}
+
+fn nowhere(value: Value) -> Node {
+    Node::new(Place::nowhere(), value)
+}
+
 /// Hashes JSON so that equal values have equal hashes.
 fn hash_json(json: &Json, hasher: &mut impl Hasher) {
     match json {
@@ -230,10 +277,10 @@ fn untagged<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     }
 }
 
-/// Returns an error if no type has this kind and name.
-pub(crate) fn known(kind: &str, name: &str) -> PyResult<()> {
-    if find(kind, name).is_some() {
-        return Ok(());
+/// Returns the type of this kind and name, or an error that names similar ones.
+pub(crate) fn known(kind: &str, name: &str) -> PyResult<&'static Entry> {
+    if let Some(entry) = find(kind, name) {
+        return Ok(entry);
     }
     let names: Vec<&str> = entries(kind).iter().map(|entry| entry.name).collect();
     let mistake = Mistake::at("type", format!("unknown {kind} `{name}`"));

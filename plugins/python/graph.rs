@@ -1,21 +1,24 @@
 //! Graphs, values and noise.
+mod entry;
 mod files;
 mod noise;
 mod shared;
 mod values;
 
-use crate::chosen::{What, factor, known, loss};
+use crate::chosen::{factor, known, loss};
 use crate::errors;
-use crate::input::{Columns, key_of, key_rows, keys, to_python};
+use crate::input::{Columns, key_of, key_rows, keys};
 use crate::threads::detach;
+use entry::Options;
 use manifactor::graph::catalogue::find;
-use manifactor::graph::{Factor, FactorEntry, Fixed, Graph as Inner, GraphError, Key};
+use manifactor::graph::{Factor, FactorEntry as Entry, Fixed, Graph as Inner, GraphError, Key};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyBytes, PyDict, PyMappingProxy};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-pub(crate) use files::{document, register};
+pub(crate) use entry::FactorEntry;
+pub(crate) use files::document;
 pub(crate) use noise::Noise;
 pub(crate) use shared::Shared;
 pub(crate) use values::Values;
@@ -32,28 +35,48 @@ impl Graph {
         Self::default()
     }
 
-    /// Adds a factor between variables, and returns its index in the graph, from 0.
+    /// Adds a factor, and returns its index in the graph, from 0: a `FactorEntry` alone, or the keys of its
+    /// variables with a residual.
     ///
-    /// `keys` are the names of its variables, in the order of the residual's arguments. `noise` defaults to
-    /// a standard deviation of 1 in every row, `loss` to none, and `name`, which reports use, to the name
-    /// of the factor's type.
-    #[pyo3(signature = (keys, factor, *, noise = None, loss = None, name = None))]
+    /// `keys` are in the order of the residual's arguments. The noise is one of `noise`, `sigma` and
+    /// `sigmas`, and defaults to a standard deviation of 1 in every row. `loss` defaults to none, and
+    /// `name`, which reports use, to the name of the factor's type.
+    #[pyo3(signature = (keys, factor = None, *, noise = None, sigma = None, sigmas = None, loss = None, name = None))]
+    #[expect(clippy::too_many_arguments, reason = "the keyword arguments of Python")]
     fn add(
         &mut self,
         keys: &Bound<'_, PyAny>,
-        factor: &Bound<'_, PyAny>,
+        factor: Option<&Bound<'_, PyAny>>,
         noise: Option<&Bound<'_, PyAny>>,
+        sigma: Option<&Bound<'_, PyAny>>,
+        sigmas: Option<&Bound<'_, PyAny>>,
         loss: Option<&Bound<'_, PyAny>>,
         name: Option<&str>,
     ) -> PyResult<usize> {
-        let keys = self::keys("add", keys)?;
-        let factor = self::factor("factor", factor)?;
-        let noise = noise::one("add", noise)?;
-        let loss = loss.map(|loss| self::loss("loss", loss)).transpose()?;
-        let (at, graph) = (self.0.factors().len(), self.0.change("graph")?);
-        let entry = FactorEntry { keys, name: name.map(Into::into), factor, noise, loss };
-        check(&entry, at)?;
-        graph.push(entry);
+        let options = Options { noise, sigma, sigmas, loss, name };
+        let at = self.0.factors().len();
+        let entry = match (keys.cast::<FactorEntry>(), factor) {
+            (Ok(entry), None) if options.is_empty() => entry.get().0.clone(),
+            (Ok(_), _) => {
+                let message = "a FactorEntry has its keys, noise and loss: pass it alone";
+                return Err(errors::argument("add", "factor", message));
+            }
+            (Err(_), None) => {
+                let found = keys.get_type().name()?;
+                let message = format!(
+                    "expected a FactorEntry such as between(\"x0\", \"x1\", pose), or keys with a factor; got {found} alone"
+                );
+                return Err(errors::argument("add", "factor", message));
+            }
+            (Err(_), Some(factor)) => {
+                let keys = self::keys("add", keys)?;
+                let factor = self::factor("factor", factor)?;
+                let entry = options.entry("add", keys, factor)?;
+                check(&entry, at)?;
+                entry
+            }
+        };
+        self.0.change("graph")?.push(entry);
         Ok(at)
     }
 
@@ -78,7 +101,7 @@ impl Graph {
         let mut entries = Vec::with_capacity(rows);
         for (row, keys) in keys.chunks_exact(width.max(1)).enumerate() {
             let (keys, factor, noise) = (keys.to_vec(), factors.row(row)?, noises.row(row)?);
-            let entry = FactorEntry { keys, name: None, factor, noise, loss: loss.clone() };
+            let entry = Entry { keys, name: None, factor, noise, loss: loss.clone() };
             // all rows have equal numbers of keys and noise of equal size
             if row == 0 {
                 check(&entry, first)?;
@@ -128,26 +151,24 @@ impl Graph {
         detach(py, || graph.check(values).iter().map(ToString::to_string).collect())
     }
 
-    /// A copy of the factor at an index, from 0, as in documents: `keys`, `factor`, `noise`, `loss`,
-    /// `name`.
-    fn __getitem__<'py>(&self, py: Python<'py>, at: isize) -> PyResult<Bound<'py, PyAny>> {
+    /// Returns the cost ½ Σ ρ(‖r‖²) at these values. Factors that are undefined there do not count.
+    fn cost(&self, py: Python<'_>, values: PyRef<'_, Values>) -> PyResult<f64> {
+        let (graph, values) = (&*self.0, &*values.0);
+        let cost = detach(py, || graph.cost(values))?;
+        crate::raised::raise()?;
+        cost.map_err(|wrong| errors::graph(GraphError::list(&wrong).trim_start()))
+    }
+
+    /// The factor at an index, from 0. Negative indices count from the end.
+    fn __getitem__(&self, at: isize) -> PyResult<FactorEntry> {
         let count = self.0.factors().len();
         let place = if at < 0 { at.checked_add_unsigned(count) } else { Some(at) };
-        let entry = place.and_then(|place| self.0.factors().get(usize::try_from(place).ok()?));
-        match entry {
-            Some(entry) => to_python(py, entry),
+        match place.and_then(|place| self.0.factors().get(usize::try_from(place).ok()?)) {
+            Some(entry) => Ok(FactorEntry(entry.clone())),
             None => {
                 let message = format!("there is no factor {at}: the graph has {count}, from 0");
                 Err(pyo3::exceptions::PyIndexError::new_err(message))
             }
-        }
-    }
-
-    /// Returns the factor at an index, from 0, as an object.
-    fn factor<'py>(&self, py: Python<'py>, at: usize) -> PyResult<Bound<'py, PyAny>> {
-        match self.0.factors().get(at) {
-            Some(entry) => What::Factor(entry.factor.clone()).into_python(py),
-            None => Err(pyo3::exceptions::PyIndexError::new_err(format!("there is no factor {at}"))),
         }
     }
 
@@ -247,7 +268,7 @@ pub(crate) fn unpickled<T: serde::de::DeserializeOwned>(what: &str, state: &[u8]
 
 /// Checks everything about a factor that needs no values: the number of its keys, and the size of its
 /// noise.
-fn check(entry: &FactorEntry, at: usize) -> PyResult<()> {
+fn check(entry: &Entry, at: usize) -> PyResult<()> {
     let mut found = vec![];
     entry.resolve(at, |_| None, &mut found);
     match found.iter().find(|error| !matches!(error, GraphError::MissingVariable { .. })) {
@@ -257,7 +278,7 @@ fn check(entry: &FactorEntry, at: usize) -> PyResult<()> {
 }
 
 /// Checks that a factor names no variable twice.
-fn distinct(entry: &FactorEntry, factor: usize) -> PyResult<()> {
+fn distinct(entry: &Entry, factor: usize) -> PyResult<()> {
     let is_repeated = |(position, key): &(usize, &Key)| entry.keys.iter().take(*position).any(|k| k == *key);
     match entry.keys.iter().enumerate().find(is_repeated) {
         None => Ok(()),
@@ -350,4 +371,9 @@ fn read(name: &str, columns: &mut Columns, row: usize) -> PyResult<Arc<dyn Facto
 /// Returns the keys in a text or a list; empty for `None`.
 pub(crate) fn optional_keys(what: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Key>> {
     value.map_or(Ok(vec![]), |value| keys(what, value))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    entry::register(module)?;
+    files::register(module)
 }

@@ -9,4 +9,4 @@ pub(crate) use arrays::{Numbers, any_numbers, array, frozen, numbers, numbers_or
 pub(crate) use columns::Columns;
 pub(crate) use fields::fields;
 pub(crate) use keys::{key_of, key_rows, keys};
-pub(crate) use node::{Untagged, json_to_python, node, to_python, unchangeable};
+pub(crate) use node::{Untagged, json_to_python, node, plain_node, to_python, unchangeable};

@@ -5,6 +5,7 @@
 mod rests_on;
 
 mod book;
+mod examples;
 mod factor;
 mod first_factor;
 mod loss;

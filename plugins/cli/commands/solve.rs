@@ -37,7 +37,7 @@ pub(crate) struct Solve {
     covariances: Option<Vec<String>>,
     #[command(flatten)]
     destination: Destination,
-    /// Print JSON: costs, iterations, termination and seconds by stage; with -v a record for each step.
+    /// Print JSON: costs, iterations, termination, seconds by stage and the estimate; with -v a record for each step.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -91,8 +91,8 @@ impl Solve {
             let certificate = certificate.map_or_else(String::new, |c| format!("{c}\n"));
             let outcome = report::outcome(&solution.outcome, verbose > 0)
                 + &report::diagnosis(&diagnosis, &solution.outcome, verbose > 0);
-            let marginals = marginals.map_or_else(String::new, |m| report::marginals(&m));
-            output::print(&(graph_file::summary(&input) + &start + &outcome + &certificate + &marginals));
+            let estimate = report::estimate(&solution.values, marginals.as_deref());
+            output::print(&(graph_file::summary(&input) + &start + &outcome + &certificate + &estimate));
         }
         Ok(Status::from(&solution.outcome.termination))
     }
@@ -116,6 +116,7 @@ impl Solve {
             "rejected": outcome.rejected,
             "seconds": outcome.times,
             "notes": input.notes,
+            "values": solution.values,
         })
     }
 }

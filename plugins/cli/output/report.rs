@@ -1,8 +1,10 @@
 //! The result of a solve as text.
 use crate::output::text::{self, Table, count, list, seconds};
+use manifactor::graph::{Values, Variable};
 use manifactor::solve::{
     Diagnosis, FactorCost, InactiveFactor, Marginal, Outcome, StartDiagnosis, WeakDirection,
 };
+use serde_json::Value;
 
 /// The outcome in a few lines: termination, cost and time. `details` adds the time of each stage.
 pub(crate) fn outcome(outcome: &Outcome, details: bool) -> String {
@@ -109,14 +111,51 @@ pub(crate) fn diagnosis(diagnosis: &Diagnosis, outcome: &Outcome, details: bool)
     format!("{condition}{}\n", table.text())
 }
 
-/// Standard deviations by direction.
-pub(crate) fn marginals(marginals: &[Marginal]) -> String {
-    let mut table = Table::of_words(&["variable", "standard deviations"]);
+/// The estimate of the first variables, or of those whose covariance was requested, with standard deviations by
+/// direction.
+pub(crate) fn estimate(values: &Values, marginals: Option<&[Marginal]>) -> String {
+    const MAX_LISTED: usize = 10;
+    let Some(marginals) = marginals else {
+        let mut table = Table::of_words(&["variable", "estimate"]);
+        for (key, value) in values.iter().take(MAX_LISTED) {
+            table.row([key.to_string(), fields(value)]);
+        }
+        let more = match values.len().saturating_sub(MAX_LISTED) {
+            0 => String::new(),
+            more => format!("and {more} more: --out FILE writes them, --json prints them\n"),
+        };
+        return format!("{}\n{more}", table.text());
+    };
+    let mut table = Table::of_words(&["variable", "estimate", "standard deviations"]);
     for Marginal { key, tangent, covariance } in marginals {
         let sigmas = covariance.diagonal().map(f64::sqrt);
         let parts: Vec<_> =
             tangent.iter().zip(&sigmas).map(|(name, sigma)| format!("{name} {sigma:.3e}")).collect();
-        table.row([key.to_string(), parts.join("  ")]);
+        let value = values.variable(key.as_str()).map_or_else(String::new, fields);
+        table.row([key.to_string(), value, parts.join("  ")]);
     }
     format!("{}\n", table.text())
+}
+
+/// The fields of a value with their numbers: `translation 1.000000 0.500000  angle 0.100000`.
+fn fields(value: &dyn Variable) -> String {
+    fn numbers(json: &Value, text: &mut String) {
+        match json {
+            Value::Number(number) => {
+                let x = number.as_f64().unwrap_or(f64::NAN);
+                let is_short = x == 0.0 || (1e-3..1e7).contains(&x.abs());
+                *text += &if is_short { format!(" {x:.6}") } else { format!(" {x:.6e}") };
+            }
+            Value::Array(items) => items.iter().for_each(|item| numbers(item, text)),
+            Value::Object(fields) => fields.values().for_each(|field| numbers(field, text)),
+            _ => {}
+        }
+    }
+    let Ok(Value::Object(json)) = serde_json::to_value(value) else { return String::new() };
+    let shown = json.iter().filter(|(name, _)| *name != "type").map(|(name, json)| {
+        let mut text = name.clone();
+        numbers(json, &mut text);
+        text
+    });
+    shown.collect::<Vec<_>>().join("  ")
 }

@@ -10,7 +10,7 @@ use pyo3::types::{PyDict, PyFloat, PyInt};
 
 /// Gaussian noise of a measurement. Default: a standard deviation of 1 in every row of the residual.
 #[pyclass(module = "manifactor", frozen)]
-pub(crate) struct Noise(Inner);
+pub(crate) struct Noise(pub Inner);
 
 const FORMS: [&str; 4] = ["sigma", "sigmas", "covariance", "information"];
 
@@ -65,7 +65,7 @@ impl Noise {
         to_python(py, &self.0)
     }
 
-    fn __repr__(&self) -> PyResult<String> {
+    pub(super) fn __repr__(&self) -> PyResult<String> {
         let json = serde_json::to_value(&self.0).map_err(errors::internal)?;
         let fields = json.as_object().into_iter().flatten();
         let fields: Vec<_> = fields.map(|(name, value)| format!("{name}={value}")).collect();
@@ -141,6 +141,22 @@ fn made(what: &str, name: &str, form: &str, values: &[f64]) -> PyResult<Inner> {
         _ => Inner::information(matrix()),
     };
     noise.map_err(|error| errors::argument(what, name, error))
+}
+
+/// Reads the arguments that give the noise of one factor: one of them, or none for unit noise.
+pub(super) fn of_arguments(
+    what: &str,
+    noise: Option<&Bound<'_, PyAny>>,
+    sigma: Option<&Bound<'_, PyAny>>,
+    sigmas: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Inner> {
+    let (form, value) = match (noise, sigma, sigmas) {
+        (noise, None, None) => return one(what, noise),
+        (None, Some(sigma), None) => ("sigma", sigma),
+        (None, None, Some(sigmas)) => ("sigmas", sigmas),
+        _ => return Err(errors::argument(what, "noise", "expected one of noise, sigma and sigmas")),
+    };
+    made(what, form, form, &read(what, form, form, value, None)?.values)
 }
 
 /// Reads the argument `noise` of one factor: a `Noise`, or a number, which is a sigma.

@@ -1,5 +1,5 @@
 //! Conversion between Python values and nodes of a document.
-use super::arrays::{any_numbers, frozen};
+use super::arrays::{Numbers, any_numbers, array, frozen};
 use crate::errors;
 use manifactor::config::{Field, MAX_DEPTH, Node, Place, SourceText, Value};
 use manifactor::graph::Variable;
@@ -8,6 +8,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMappingProxy, PyString, PyTuple};
 use serde_json::Value as Json;
+use std::fmt::Display;
 use std::sync::Arc;
 
 /// The fields of a value without its type, for a field that accepts only one type.
@@ -15,16 +16,103 @@ use std::sync::Arc;
 pub(crate) struct Untagged(pub Arc<dyn Variable>);
 
 impl Untagged {
-    fn fields(&self) -> PyResult<Json> {
+    /// Returns the fields as a node, all of whose parts have one place.
+    pub(crate) fn node(&self, place: &Place) -> PyResult<Node> {
         let mut json = serde_json::to_value(&*self.0).map_err(errors::internal)?;
         json.as_object_mut().map(|fields| fields.shift_remove("type"));
-        Ok(json)
+        Ok(json_node(place, json))
     }
 }
 
-/// The place of an argument such as `camera.fx`, with a text that errors can show.
-fn place(path: &str, text: &str) -> Place {
-    SourceText::new(path, text).place(0..text.len())
+/// Where a value is, for messages.
+trait Where: Sized {
+    /// The error of a value that no document can hold.
+    type Wrong: From<PyErr>;
+    /// The place of the value, with a text that errors can show.
+    fn place(&self, text: &str) -> Place;
+    /// A field of the value.
+    fn field(&self, name: &str) -> Self;
+    /// An item of the value.
+    fn item(&self, index: usize) -> Self;
+    fn wrong(&self, message: impl Display) -> Self::Wrong;
+    /// Takes a number, which may be infinite or NaN if a reader reports it.
+    fn float(&self, x: f64) -> Result<f64, Self::Wrong>;
+    /// Reads the numbers of an array, which have to be finite.
+    fn numbers(&self, array: &Bound<'_, PyAny>) -> PyResult<Numbers>;
+}
+
+/// A value of an argument such as `camera.fx`.
+struct Argument<'a> {
+    what: &'a str,
+    path: String,
+}
+
+impl Where for Argument<'_> {
+    type Wrong = PyErr;
+
+    fn place(&self, text: &str) -> Place {
+        SourceText::new(&self.path, text).place(0..text.len())
+    }
+
+    fn field(&self, name: &str) -> Self {
+        Self { what: self.what, path: within(&self.path, name) }
+    }
+
+    fn item(&self, index: usize) -> Self {
+        Self { what: self.what, path: format!("{}[{index}]", self.path) }
+    }
+
+    fn wrong(&self, message: impl Display) -> PyErr {
+        errors::argument(self.what, &self.path, message)
+    }
+
+    fn float(&self, x: f64) -> PyResult<f64> {
+        Ok(x)
+    }
+
+    fn numbers(&self, value: &Bound<'_, PyAny>) -> PyResult<Numbers> {
+        any_numbers(self.what, &self.path, &array(self.what, &self.path, value)?)
+    }
+}
+
+/// A value without a place. A message about it is lost.
+struct Anywhere;
+
+/// Something that no document can hold.
+struct Unreadable;
+
+impl From<PyErr> for Unreadable {
+    fn from(_: PyErr) -> Self {
+        Self
+    }
+}
+
+impl Where for Anywhere {
+    type Wrong = Unreadable;
+
+    fn place(&self, _text: &str) -> Place {
+        Place::nowhere()
+    }
+
+    fn field(&self, _name: &str) -> Self {
+        Self
+    }
+
+    fn item(&self, _index: usize) -> Self {
+        Self
+    }
+
+    fn wrong(&self, _message: impl Display) -> Unreadable {
+        Unreadable
+    }
+
+    fn float(&self, x: f64) -> Result<f64, Unreadable> {
+        if x.is_finite() { Ok(x) } else { Err(Unreadable) }
+    }
+
+    fn numbers(&self, value: &Bound<'_, PyAny>) -> PyResult<Numbers> {
+        any_numbers("", "", &array("", "", value)?)
+    }
 }
 
 /// The path of a field within an argument.
@@ -37,12 +125,17 @@ pub(crate) fn within(path: &str, name: &str) -> String {
 /// # Errors
 /// If no document can hold a value.
 pub(crate) fn node(what: &str, path: &str, value: &Bound<'_, PyAny>) -> PyResult<Node> {
-    nested(what, path, value, 0)
+    nested(&Argument { what, path: path.to_owned() }, value, 0)
 }
 
-fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Node> {
+/// Converts a value to a node without places. `None` for everything that [`node`] or a reader might reject.
+pub(crate) fn plain_node(value: &Bound<'_, PyAny>) -> Option<Node> {
+    nested(&Anywhere, value, 0).ok()
+}
+
+fn nested<W: Where>(at: &W, value: &Bound<'_, PyAny>, depth: usize) -> Result<Node, W::Wrong> {
     if depth > MAX_DEPTH {
-        return Err(errors::argument(what, path, format!("nested more than {MAX_DEPTH} levels deep")));
+        return Err(at.wrong(format_args!("nested more than {MAX_DEPTH} levels deep")));
     }
     let plain = if value.is_none() {
         Value::Null
@@ -53,48 +146,46 @@ fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyR
             Ok(whole) => Value::Integer(whole),
             Err(_) => match value.extract() {
                 Ok(large) => Value::Float(large),
-                Err(_) => return Err(errors::argument(what, path, "expected a number of at most 64 bits")),
+                Err(_) => return Err(at.wrong("expected a number of at most 64 bits")),
             },
         }
     } else if let Ok(value) = value.cast::<PyFloat>() {
-        Value::Float(value.value())
+        Value::Float(at.float(value.value())?)
     } else if let Ok(text) = value.cast::<PyString>() {
         let text = text.to_cow()?.into_owned();
-        return Ok(Node::new(place(path, &text), Value::String(text)));
+        return Ok(Node::new(at.place(&text), Value::String(text)));
     } else if let Ok(fields) = value.cast::<PyMappingProxy>() {
         // fields of an immutable object
-        return nested(what, path, &fields.call_method0("copy")?, depth);
+        return nested(at, &fields.call_method0("copy")?, depth);
     } else if let Ok(dict) = value.cast::<PyDict>() {
         let mut table = manifactor::config::Table::default();
         for (name, value) in dict {
             let Ok(name) = name.extract::<String>() else {
-                return Err(errors::argument(what, path, format!("expected names as keys, got {name}")));
+                return Err(at.wrong(format_args!("expected names as keys, got {name}")));
             };
-            let inner = within(path, &name);
-            let node = nested(what, &inner, &value, depth + 1)?;
-            table.insert(name, Field { key: place(&inner, ""), node });
+            let inner = at.field(&name);
+            let node = nested(&inner, &value, depth + 1)?;
+            table.insert(name, Field { key: inner.place(""), node });
         }
         Value::Table(table)
     } else if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
         let items = value.try_iter()?.enumerate();
-        let item = |(i, item): (usize, PyResult<_>)| nested(what, &format!("{path}[{i}]"), &item?, depth + 1);
-        Value::Array(items.map(item).collect::<PyResult<_>>()?)
-    } else if value.cast::<PyUntypedArray>().is_ok() || is_array_like(value)? {
-        let array = super::array(what, path, value)?;
-        let numbers = any_numbers(what, path, &array)?;
-        return Ok(array_node(&place(path, ""), &numbers.shape, &numbers.values, numbers.whole));
+        let item = |(i, item): (usize, PyResult<_>)| nested(&at.item(i), &item?, depth + 1);
+        Value::Array(items.map(item).collect::<Result<_, W::Wrong>>()?)
     } else if let Ok(value) = value.cast::<Untagged>() {
-        return Ok(json_node(&place(path, ""), value.get().fields()?));
+        return Ok(value.get().node(&at.place(""))?);
+    } else if value.cast::<PyUntypedArray>().is_ok() || is_array_like(value)? {
+        let numbers = at.numbers(value)?;
+        return Ok(array_node(&at.place(""), &numbers.shape, &numbers.values, numbers.whole));
     } else if let Ok(fields) = value.call_method0("to_dict") {
-        return nested(what, path, &fields, depth + 1);
+        return nested(at, &fields, depth + 1);
     } else if let Ok(path_like) = value.call_method0("__fspath__") {
-        return nested(what, path, &path_like, depth + 1);
+        return nested(at, &path_like, depth + 1);
     } else {
         let found = value.get_type().name()?;
-        let message = format!("expected numbers, texts, lists, dicts or arrays, got {found}");
-        return Err(errors::argument(what, path, message));
+        return Err(at.wrong(format_args!("expected numbers, texts, lists, dicts or arrays, got {found}")));
     };
-    Ok(Node::new(place(path, ""), plain))
+    Ok(Node::new(at.place(""), plain))
 }
 
 /// Returns true for objects that NumPy converts to an array, such as a `pandas.Series`. NumPy converts points

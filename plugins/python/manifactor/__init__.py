@@ -7,8 +7,8 @@
     graph, values = mf.Graph(), mf.Values()
     values["x0"] = mf.Se2(translation=[0, 0], angle=0)
     values["x1"] = mf.Se2(translation=[1, 0], angle=0)
-    graph.add("x0", mf.prior_se2(value=values["x0"]))
-    graph.add(["x0", "x1"], mf.between_se2(relative=mf.Se2(translation=[1, 0], angle=0.1)), noise=0.1)
+    graph.add(mf.prior("x0", values["x0"]))
+    graph.add(mf.between("x0", "x1", mf.Se2(translation=[1, 0], angle=0.1), sigma=0.1))
     solution = mf.solve(graph, values)
 """
 
@@ -17,7 +17,7 @@ from __future__ import annotations
 import os
 
 from . import detections, errors, factors, functions, losses, solvers, starts, types, variables
-from ._native import FactorId, Graph, Noise, Smoother, Solution, Values, __version__, solve
+from ._native import FactorEntry, FactorId, Graph, Noise, Smoother, Solution, Values, __version__, between, prior, solve
 from ._native import read as _read
 from .algebra import ValueArray
 from .batched import BatchFactor, batch
@@ -44,6 +44,7 @@ __all__ = [
     "DocumentError",
     "ExistsError",
     "Factor",
+    "FactorEntry",
     "FactorId",
     "Graph",
     "GraphError",
@@ -67,6 +68,7 @@ __all__ = [
     "__version__",
     "auto",
     "batch",
+    "between",
     "check_factor",
     "detections",
     "dogleg",
@@ -83,6 +85,7 @@ __all__ = [
     "losses",
     "online",
     "poses",
+    "prior",
     "require",
     "rotations",
     "run",

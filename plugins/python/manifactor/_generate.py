@@ -18,6 +18,9 @@ KINDS = ("factor", "loss", "solver", "start")
 CLASSES = {"factor": "Factor", "loss": "Loss", "solver": "Solver", "start": "Start", "variable": "Variable"}
 HEADER = '"""{about}\n\nWritten by `python -m manifactor._generate` from the catalogue."""\n\nfrom __future__ import annotations\n'
 WIDTH = 110
+#: Base classes of the groups in space.
+SPATIAL = {"so3": "SpatialRotation", "se3": "SpatialPose"}
+GROUPS = ("Group", *SPATIAL.values())
 
 Schema = dict[str, Any]
 
@@ -215,8 +218,8 @@ def module(kind: str, entries: list[Schema], types: Types, variables: dict[str, 
 
 def base_of(entry: Schema, functions: list[Schema]) -> str:
     """The base class of a type of variables."""
-    if entry["name"] == "so3":
-        return "SpatialRotation"
+    if entry["name"] in SPATIAL:
+        return SPATIAL[entry["name"]]
     quantity = entry["quantity"] or ""
     if any(f["name"] == "inverse" and f["arguments"][0][1] == quantity for f in functions):
         return "Group"
@@ -246,7 +249,7 @@ def places_of(entry: Schema) -> str:
 def methods_of(entry: Schema, base: str, own: set[str], functions: list[Schema], groups: dict[str, str]) -> list[str]:
     """Functions of formulas, as properties if they have one argument and as methods otherwise."""
     taken = set(own) | {"sum", "where", "vector"}
-    if base in ("Group", "SpatialRotation"):
+    if base in GROUPS:
         taken |= {"inverse", "log", "between"}
     lines: list[str] = []
     for function in functions:
@@ -270,7 +273,7 @@ def module_of_variables(entries: list[Schema], functions: list[Schema], types: T
     types.used = set()
     parts = []
     bases = {entry["name"]: base_of(entry, functions) for entry in entries}
-    groups = {name: camel(name) for name, base in bases.items() if base in ("Group", "SpatialRotation")}
+    groups = {name: camel(name) for name, base in bases.items() if base in GROUPS}
     for entry in entries:
         fields = parameters(entry, types, {})
         name, base = camel(entry["name"]), bases[entry["name"]]
@@ -301,7 +304,7 @@ def module_of_variables(entries: list[Schema], functions: list[Schema], types: T
     head = HEADER.format(about="Every type of variables that is linked, as a class of its values.")
     head += "\nfrom collections.abc import Mapping\nfrom typing import Any, ClassVar, Self\n"
     head += "\nimport numpy as np\nfrom numpy.typing import NDArray\n"
-    head += "\nfrom .chosen import Numbers, Variable, computed\nfrom .groups import Group, SpatialRotation, Vector\n"
+    head += "\nfrom .chosen import Numbers, Variable, computed\nfrom .groups import Group, SpatialPose, SpatialRotation, Vector\n"
     head += "\n__all__ = [\n" + "".join(f'    "{camel(entry["name"])}",\n' for entry in entries) + "]\n"
     return head + "\n\n" + body + named
 

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Self, SupportsIndex, final
+from typing import Any, Self, SupportsIndex, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -71,26 +71,94 @@ class Noise:
         """Returns the noise as in a document."""
 
 @final
+class FactorEntry:
+    """A factor of a graph: a residual between variables, with its noise and loss."""
+
+    def __new__(
+        cls,
+        keys: _Keys,
+        factor: Factor,
+        *,
+        noise: Noise | float | None = None,
+        sigma: float | None = None,
+        sigmas: ArrayLike | None = None,
+        loss: Loss | None = None,
+        name: str | None = None,
+    ) -> Self:
+        """`keys` are the names of the variables, in the order of the residual's arguments: `["x0", "p3"]` or
+        `[0, ("p", 3)]`. A number alone has the prefix `x`. The noise is a `Noise`, a standard deviation
+        `sigma` for all rows, or `sigmas`, one for each; a number as `noise` is a `sigma`. It defaults to 1 in
+        every row, `loss` to none, and `name`, which reports use, to the name of the factor's type. A wrong
+        number of keys, a repeated key and noise of a wrong size raise a `GraphError`."""
+    @property
+    def keys(self) -> list[str]:
+        """The names of its variables."""
+    @property
+    def factor(self) -> Factor:
+        """The residual and its parameters."""
+    @property
+    def noise(self) -> Noise:
+        """The noise of the residual."""
+    @property
+    def loss(self) -> Loss | None:
+        """The robust loss, if there is one."""
+    @property
+    def name(self) -> str:
+        """The label in reports."""
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the factor as in a document: `keys`, `factor`, `noise`, `loss`, `name`."""
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, memo: Any) -> Self: ...
+
+def between(
+    first: _Key,
+    second: _Key,
+    relative: Variable,
+    *,
+    noise: Noise | float | None = None,
+    sigma: float | None = None,
+    sigmas: ArrayLike | None = None,
+    loss: Loss | None = None,
+    name: str | None = None,
+) -> FactorEntry:
+    """Returns the factor `between_…` of the type of `relative`: the second variable is at `relative`, seen
+    from the first. The other arguments are those of `FactorEntry`."""
+
+def prior(
+    key: _Key,
+    value: Variable,
+    *,
+    noise: Noise | float | None = None,
+    sigma: float | None = None,
+    sigmas: ArrayLike | None = None,
+    loss: Loss | None = None,
+    name: str | None = None,
+) -> FactorEntry:
+    """Returns the factor `prior_…` of the type of `value`: the variable is at `value`. The other arguments
+    are those of `FactorEntry`."""
+
+@final
 class Graph:
     """Factors between named variables, and the variables that are fixed."""
 
     def __new__(cls) -> Self: ...
+    @overload
+    def add(self, keys: FactorEntry) -> int: ...
+    @overload
     def add(
         self,
         keys: _Keys,
         factor: Factor,
         *,
         noise: Noise | float | None = None,
+        sigma: float | None = None,
+        sigmas: ArrayLike | None = None,
         loss: Loss | None = None,
         name: str | None = None,
-    ) -> int:
-        """Adds a factor between variables, and returns its index in the graph, from 0.
-
-        `keys` are the names of its variables, in the order of the residual's arguments: `["x0", "p3"]` or
-        `[0, ("p", 3)]`. A number alone has the prefix `x`. `noise` may be a
-        number, which is a sigma for all rows. `noise` defaults to a standard deviation of 1 in every row,
-        `loss` to none, and `name`, which reports use, to the name of the factor's type. A wrong number of
-        keys, a repeated key and noise of a wrong size raise a `GraphError`."""
+    ) -> int: ...
+    def add(self, keys: _Keys | FactorEntry, factor: Factor | None = None, **options: Any) -> int:
+        """Adds a factor, and returns its index in the graph, from 0: a `FactorEntry`, such as
+        `mf.between("x0", "x1", pose, sigma=0.1)`, or the arguments of one."""
     def add_many(
         self,
         factor: str | Factor | Callable[..., Factor],
@@ -120,16 +188,16 @@ class Graph:
         them."""
     def check(self, values: Values) -> list[str]:
         """Returns all errors of the graph with these values; empty if it can be solved."""
-    def factor(self, at: int) -> Factor:
-        """Returns the factor at an index, from 0, as an object."""
+    def cost(self, values: Values) -> float:
+        """Returns the cost ½ Σ ρ(‖r‖²) at these values. Factors that are undefined there do not count."""
     def types(self) -> dict[str, int]:
         """Returns the number of factors of each type."""
     def to_document(self, values: Values, format: str = "toml") -> str:
         """Returns the graph and its values as a document in `toml`, `json` or `yaml`, which `manifactor
         solve` reads."""
-    def __getitem__(self, at: int) -> dict[str, Any]:
-        """A copy of the factor at an index, from 0, as in documents: `keys`, `factor`, `noise`, `loss`,
-        `name`."""
+    def __getitem__(self, at: int) -> FactorEntry:
+        """The factor at an index, from 0."""
+    def __iter__(self) -> Iterator[FactorEntry]: ...
     def __len__(self) -> int: ...
     def __add__(self, other: Graph) -> Graph:
         """Returns a graph with the factors and fixed variables of both."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import math
+import operator
 from collections.abc import Callable, Iterator, Sequence
 from functools import reduce
 from typing import Any, NoReturn
@@ -153,6 +154,17 @@ class Expr:
         help = f"what takes it: {', '.join(taken)}"
         raise AttributeError(str(Mistake("", f"a {self.shape} has no `{name}`", help)))
 
+    def sum(self) -> Expr:
+        """Returns the sum of the components of a vector."""
+        return call("sum", self)
+
+    def tanh(self) -> Expr:
+        """Returns the hyperbolic tangent of a number."""
+        # e^-2|x| does not overflow, and the derivative at 0 is 1 from both sides
+        falling = call("exp", -2.0 * abs(self))
+        size = (1.0 - falling) / (1.0 + falling)
+        return where(self < 0, -size, size)  # type: ignore[no-any-return]
+
     def __call__(self) -> Expr:
         """Returns `x.inverse` for `x.inverse()`, so that a function computes with symbols as with values."""
         if self.name not in METHODS or not self.arguments:
@@ -173,13 +185,18 @@ class Expr:
             raise TypeError(f"a {self.shape} has no length")
         return LENGTHS[self.shape]
 
-    def __getitem__(self, index: int) -> Expr:
+    def __getitem__(self, index: int | slice) -> Any:
+        """Returns a component, or the components of a slice: a number for one, a vector for several."""
         if self.shape not in ("vector2", "vector3"):
             wrong(f"a {self.shape} cannot be indexed")
-        names = "xyz"[: len(self)]
+        if isinstance(index, slice):
+            chosen = [self[i] for i in range(*index.indices(len(self)))]
+            if chosen:
+                return self.trace.vector(chosen) if len(chosen) > 1 else chosen[0]
+            wrong("this slice is empty")
         if not isinstance(index, int) or not -len(self) <= index < len(self):
             raise IndexError(f"a {self.shape} has the components 0 to {len(self) - 1}")
-        return call(names[index], self)
+        return call("xyz"[: len(self)][index], self)
 
     def __iter__(self) -> Iterator[Expr]:
         return (self[i] for i in range(len(self)))
@@ -220,10 +237,14 @@ class Expr:
     def __abs__(self) -> Expr:
         return call("abs", self)
 
-    def __matmul__(self, other: Any) -> Expr:
+    def __matmul__(self, other: Any) -> Any:
+        if is_matrix(other):
+            return combined(self, np.asarray(other).T)
         return product(self, self.trace.lift(other))
 
-    def __rmatmul__(self, other: Any) -> Expr:
+    def __rmatmul__(self, other: Any) -> Any:
+        if is_matrix(other):
+            return combined(self, np.asarray(other))
         return product(self.trace.lift(other), self)
 
     def __lt__(self, other: Any) -> Condition:
@@ -322,6 +343,20 @@ def product(a: Expr, b: Expr) -> Expr:
     return call("dot" if a.shape in LENGTHS else "*", a, b)
 
 
+def is_matrix(value: Any) -> bool:
+    """Returns True for a constant array of two axes."""
+    return isinstance(value, np.ndarray) and value.ndim == 2
+
+
+def combined(vector: Expr, matrix: Any) -> Any:
+    """Returns the product of a constant matrix with 1 to 3 rows and a vector: a number for one row."""
+    items, (rows, columns) = list(vector), matrix.shape
+    if columns != len(items) or not 1 <= rows <= 3:
+        wrong(f"a matrix of shape ({rows}, {columns}) does not fit a {vector.shape}", f"shape (1 to 3, {len(items)})")
+    sums = [reduce(operator.add, (x * item for x, item in zip(row.tolist(), items, strict=True))) for row in matrix]
+    return vector.trace.vector(sums) if rows > 1 else sums[0]
+
+
 def _total(items: Any) -> Any:
     return call("sum", items) if isinstance(items, Expr) else sum(items)
 
@@ -336,6 +371,7 @@ UFUNCS: dict[str, Callable[..., Any]] = {
     **{"negative": in_turn("-"), "absolute": in_turn("abs"), "power": in_turn("^"), "log": in_turn("ln")},
     **{"arcsin": in_turn("asin"), "arccos": in_turn("acos"), "arctan": in_turn("atan"), "arctan2": in_turn("atan2")},
     **{"minimum": in_turn("min"), "maximum": in_turn("max"), "square": lambda a: a * a},
+    "tanh": lambda a: a.tanh(),
     "matmul": lambda a, b: a @ b if isinstance(a, Expr) else b.__rmatmul__(a),
     "greater": lambda a, b: a > b if isinstance(a, Expr) else b < a,
     "less": lambda a, b: a < b if isinstance(a, Expr) else b > a,

@@ -107,6 +107,24 @@ class SpatialRotation(Group):
         return scipy_rotation(self)
 
 
+class SpatialPose(Group):
+    """A pose in space, also of a camera."""
+
+    @classmethod
+    def look_at(cls, position: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) -> Self:
+        """Returns the pose of a camera at `position` that looks at `target`, shape (3,), in metres. The camera's z
+        points forward, x to the right of the image and y down; `up` points to the upper side of the image."""
+        at, ahead, above = (np.asarray(v, float) for v in (position, np.subtract(target, position), up))
+        right = np.cross(ahead, above)
+        if not np.linalg.norm(right) > 1e-9 * np.linalg.norm(ahead) * np.linalg.norm(above):
+            message = "expected a target that differs from the position, in a direction that differs from `up`"
+            raise ArgumentError("look_at", [Mistake("target", message)])
+        axes = [v / np.linalg.norm(v) for v in (right, np.cross(ahead, right), ahead)]
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = np.stack(axes, axis=1), at
+        return cls.from_matrix(matrix)  # type: ignore[no-any-return]
+
+
 class Vector(Variable):
     """A value whose numbers are a vector: NumPy's functions accept it."""
 

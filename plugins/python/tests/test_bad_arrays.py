@@ -75,7 +75,7 @@ COUNTED = np.arange(3.0 * N).reshape(N, 3)
 def test_any_layout_will_do(array: np.ndarray[Any, Any]) -> None:
     array.flags.writeable = False
     graph = add({**GOOD, "translation": array})
-    assert [graph[row]["factor"]["relative"]["translation"] for row in range(N)] == COUNTED.tolist()
+    assert [graph[row].to_dict()["factor"]["relative"]["translation"] for row in range(N)] == COUNTED.tolist()
     assert mf.Point3(position=array[1]).position.tolist() == COUNTED[1].tolist()
 
 

@@ -64,7 +64,7 @@ def test_values_have_their_class() -> None:
     assert type(values["x"]) is mf.Se3 and values["x"].TANGENT == ("rx", "ry", "rz", "x", "y", "z")
     factor = mf.Graph()
     factor.add("x", mf.prior_se3(value=values["x"]))
-    assert type(factor.factor(0)) is mf.Factor
+    assert type(factor[0].factor) is mf.Factor
 
 
 def test_names_at_the_top_are_told_apart() -> None:

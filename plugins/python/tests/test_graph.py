@@ -63,8 +63,8 @@ def test_many_at_once_are_the_same_as_one_by_one() -> None:
 def test_a_factor_that_is_the_same_for_all_and_a_prefix_for_each_column() -> None:
     graph = mf.Graph()
     graph.add_many(mf.range_se2_point2(range=2.0), np.array([[0, 7], [1, 8]]), prefix=["x", "l"], noise=0.1)
-    assert [graph[i]["keys"] for i in range(2)] == [["x0", "l7"], ["x1", "l8"]]
-    assert graph[-1]["factor"] == {"type": "range_se2_point2", "range": 2.0}
+    assert [graph[i].keys for i in range(2)] == [["x0", "l7"], ["x1", "l8"]]
+    assert graph[-1].factor.to_dict() == {"type": "range_se2_point2", "range": 2.0}
     with pytest.raises(IndexError, match="there is no factor 2"):
         graph[2]
 
@@ -80,7 +80,7 @@ def test_noise_by_rows(form: str) -> None:
     graph.add_many(mf.between_se2, keys, fields, noise={form: array})
     for i in range(5):
         one = mf.Noise(**{form: array[i]})
-        assert graph[i]["noise"] == one.to_dict()
+        assert graph[i].noise == one
     expected = {"sigmas": np.diag(array[0] ** -2), "covariance": np.linalg.inv(array[0]) if form != "sigmas" else 0}
     np.testing.assert_allclose(mf.Noise(**{form: array[0]}).information_matrix(3), expected.get(form, array[0]))
 

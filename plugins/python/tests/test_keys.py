@@ -21,7 +21,7 @@ def chain() -> tuple[mf.Graph, mf.Values]:
 
 def test_numbers_and_pairs_are_texts_with_a_prefix() -> None:
     graph, values = chain()
-    assert [graph[i]["keys"] for i in range(3)] == [["x0"], ["x0", "x1"], ["x1", "x2"]]
+    assert [graph[i].keys for i in range(3)] == [["x0"], ["x0", "x1"], ["x1", "x2"]]
     assert values.keys() == ["x0", "x1", "x2"]
     solution = mf.solve(graph, values)
     x: Any = solution.values["x", 2]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-NOTEBOOK = Path(__file__).parents[3] / "examples" / "05_python" / "first_steps.ipynb"
+NOTEBOOK = Path(__file__).parents[3] / "examples" / "python" / "first_steps.ipynb"
 
 
 def test_the_notebook_runs() -> None:

@@ -77,7 +77,7 @@ def test_graphs_and_values_take_arrays() -> None:
     steps = POSES[:-1].between(POSES[1:])
     graph.add_many(mf.between_se3, keys, {"relative": steps})
     graph.fix("x0")
-    assert graph.factor(2) == mf.between_se3(relative=steps[2])
+    assert graph[2].factor == mf.between_se3(relative=steps[2])
     assert mf.solve(graph, values).cost < 1e-20
 
 
@@ -196,4 +196,4 @@ def test_values_are_constants_of_a_batch() -> None:
     assert apart_from(anchor=POSES[1]).residual(POSES[1]) == 0
     graph = mf.Graph()
     graph.add_many(apart_from, np.arange(N)[:, None], {"anchor": POSES})
-    assert graph.factor(3).residual(POSES[3]) == 0
+    assert graph[3].factor.residual(POSES[3]) == 0

@@ -54,7 +54,7 @@ class Live:
         ids = self.smoother.push(graph, values)
         if any(name in BOXES for name in graph.types()):
             for number in range(len(graph)):
-                entry = graph[number]
+                entry = graph[number].to_dict()
                 if entry["factor"]["type"] in BOXES:
                     pose, thing = entry["keys"]
                     self._seen.setdefault(pose, []).append((thing, entry["factor"]["box"]))
