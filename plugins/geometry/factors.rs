@@ -1,4 +1,5 @@
 //! Measurements of poses and points; one file per factor.
+mod bearing_3d;
 mod bearing_range;
 mod bearing_range_3d;
 mod between;
@@ -13,6 +14,7 @@ mod prior;
 mod range;
 mod scaled_between;
 
+pub use bearing_3d::Bearing3;
 pub use bearing_range::BearingRange2;
 pub use bearing_range_3d::BearingRange3;
 pub use between::Between;

@@ -22,12 +22,13 @@ pub mod testing;
 
 pub use bundle::{
     AnyCamera, BalCamera, Camera, CameraError, CameraModel, Distortion, DistortionError, DoubleSphere,
-    ExtendedUnified, KannalaBrandt, Projection, ProjectionBal, RadialTangential,
+    ExtendedUnified, InverseDepthProjection, KannalaBrandt, Projection, ProjectionBal, RadialTangential,
+    Stereo,
 };
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{
-    BearingRange2, BearingRange3, Between, ChordalBetween, ConstantVelocity, Heading, Landmark, Located,
-    OnBody, OnBodyError, Position, Prior, Range, ScaledBetween,
+    Bearing3, BearingRange2, BearingRange3, Between, ChordalBetween, ConstantVelocity, Heading, Landmark,
+    Located, OnBody, OnBodyError, Position, Prior, Range, ScaledBetween,
 };
 pub use groups::{
     AngleError, Coordinates, CoordinatesError, ImuBias, LieGroup, MatrixError, Point1, Point2, Point3, Rn,

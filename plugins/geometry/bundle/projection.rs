@@ -36,15 +36,15 @@ impl<M: CameraModel> Projection<M> {
     pub fn new(pixel: Coordinates<2>, camera: M) -> Self {
         Self { pixel, camera, body_from_camera: None }
     }
+}
 
-    /// Returns the point in the frame of the camera.
-    #[inline]
-    fn seen<T: Scalar>(&self, pose: &Se3<T>, point: &Vector3<T>) -> Vector3<T> {
-        let point = pose.inverse_act(point);
-        match &self.body_from_camera {
-            Some(mounting) => mounting.lift::<T>().inverse_act(&point),
-            None => point,
-        }
+/// Returns a point in the frame of a camera whose pose is `pose`, or `pose` times the mounting.
+#[inline]
+pub(super) fn seen<T: Scalar>(pose: &Se3<T>, point: &Vector3<T>, mounting: Option<&Se3>) -> Vector3<T> {
+    let point = pose.inverse_act(point);
+    match mounting {
+        Some(mounting) => mounting.lift::<T>().inverse_act(&point),
+        None => point,
     }
 }
 
@@ -55,12 +55,12 @@ impl<M: CameraModel> Residual for Projection<M> {
 
     #[inline]
     fn residual<T: Scalar>(&self, (pose, point): Lifted<Self::Variables, T>) -> Vector2<T> {
-        self.camera.project(&self.seen(&pose, &point)) - self.pixel.lift::<T>()
+        self.camera.project(&seen(&pose, &point, self.body_from_camera.as_ref())) - self.pixel.lift::<T>()
     }
 
     #[inline]
     fn is_defined(&self, (pose, point): Refs<'_, Self::Variables>) -> bool {
-        self.camera.sees(&self.seen(pose, point))
+        self.camera.sees(&seen(pose, point, self.body_from_camera.as_ref()))
     }
 
     #[inline]
@@ -71,7 +71,7 @@ impl<M: CameraModel> Residual for Projection<M> {
         jacobians: &mut Jacobians<Self>,
     ) -> Vector2<f64> {
         let local = pose.inverse_act(point);
-        let seen = self.seen(pose, point);
+        let seen = seen(pose, point, self.body_from_camera.as_ref());
         let mut by_local = self.camera.derivative(&seen);
         if let Some(mounting) = &self.body_from_camera {
             by_local *= mounting.rotation.matrix().transpose();

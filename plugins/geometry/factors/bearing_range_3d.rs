@@ -35,12 +35,35 @@ impl BearingRange3 {
     pub fn measured(&self) -> Vector3<f64> {
         *self.direction * self.range.get()
     }
-    /// Returns two axes perpendicular to the measured direction and to each other.
-    fn basis(&self) -> [Vector3<f64>; 2] {
-        let z = *self.direction;
-        let first = z.cross(&Vector3::ith(z.iamin(), 1.0)).cross(&z).normalize();
-        [first, z.cross(&first)]
-    }
+}
+
+/// Returns two axes perpendicular to a direction and to each other.
+fn basis(z: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let first = z.cross(&Vector3::ith(z.iamin(), 1.0)).cross(z).normalize();
+    [first, z.cross(&first)]
+}
+
+/// Returns the arc from a unit vector `z` to the direction of a vector of length `distance`, in radians along the two axes
+/// perpendicular to `z`.
+pub(super) fn arc<T: Scalar>(z: &Vector3<f64>, vector: &Vector3<T>, distance: T) -> Vector2<T> {
+    let [a, b] = basis(z).map(|axis| axis.lift::<T>().dot(vector) / distance);
+    let cos = z.lift::<T>().dot(vector) / distance;
+    let sin2 = a * a + b * b;
+    // θ/sin θ. At zero, where the sine has no derivative, its series.
+    let scale = if sin2 < T::from(1e-8) && cos > T::zero() {
+        T::one() + sin2 / 6.0 + sin2 * sin2 * 0.075
+    } else {
+        let sin = sin2.sqrt();
+        atan2(sin, cos) / sin
+    };
+    Vector2::new(a * scale, b * scale)
+}
+
+/// Returns whether there is an arc from a unit vector to a vector: not to zero, and not to the opposite direction.
+pub(super) fn has_arc(z: &Vector3<f64>, vector: &Vector3<f64>) -> bool {
+    let distance = vector.norm();
+    let opposite = vector.dot(z) < 0.0 && vector.cross(z).norm() < 1e-6 * distance;
+    distance >= NEAREST && !opposite
 }
 
 impl Residual for BearingRange3 {
@@ -50,24 +73,11 @@ impl Residual for BearingRange3 {
     fn residual<T: Scalar>(&self, (x, p): Lifted<Self::Variables, T>) -> Vector3<T> {
         let seen = x.inverse_act(&p);
         let distance = seen.norm_squared().sqrt();
-        let [a, b] = self.basis().map(|axis| axis.lift::<T>().dot(&seen) / distance);
-        let cos = self.direction.lift::<T>().dot(&seen) / distance;
-        let sin2 = a * a + b * b;
-        // θ/sin θ. At zero, where the sine has no derivative, its series.
-        let scale = if sin2 < T::from(1e-8) && cos > T::zero() {
-            T::one() + sin2 / 6.0 + sin2 * sin2 * 0.075
-        } else {
-            let sin = sin2.sqrt();
-            atan2(sin, cos) / sin
-        };
-        Vector3::new(a * scale, b * scale, distance - self.range.get())
+        let arc = arc(&self.direction, &seen, distance);
+        Vector3::new(arc.x, arc.y, distance - self.range.get())
     }
     fn is_defined(&self, (x, p): Refs<'_, Self::Variables>) -> bool {
-        let seen = x.inverse_act(p);
-        let distance = seen.norm();
-        let opposite =
-            seen.dot(&self.direction) < 0.0 && seen.cross(&self.direction).norm() < 1e-6 * distance;
-        distance >= NEAREST && !opposite
+        has_arc(&self.direction, &x.inverse_act(p))
     }
 }
 register_factor!("bearing_range_se3", BearingRange3);

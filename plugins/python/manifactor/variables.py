@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .chosen import Numbers, Variable, computed
-from .groups import Group, SpatialRotation, Vector
+from .groups import Group, SpatialPose, SpatialRotation, Vector
 
 __all__ = [
     "BalCamera",
@@ -693,7 +693,7 @@ class Se2(Group):
         return computed(self, "rotation")  # type: ignore[no-any-return]
 
 
-class Se3(Group):
+class Se3(SpatialPose):
     """A pose in space, X·Exp(ω, v): tangent (rx, ry, rz, x, y, z), in radians and metres, in the local frame.
 
     It maps points from the local frame to the outer one: R p + t. The rotation is a unit quaternion (x, y, z,
