@@ -225,6 +225,9 @@ pub(crate) fn factor_of_value(
     value: &Arc<dyn Variable>,
 ) -> PyResult<Arc<dyn Factor>> {
     let entry = known("factor", name)?;
+    if !value.erased().is_finite() {
+        return Err(errors::argument(name, field, "expected finite numbers"));
+    }
     let node = Untagged(value.clone()).node(&Place::nowhere())?;
     let table = Table::new([(field.to_owned(), Field { key: Place::nowhere(), node })].into_iter().collect());
     let read = entry.read::<dyn Factor>(&nowhere(Value::Table(table)));

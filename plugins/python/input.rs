@@ -4,6 +4,7 @@ mod columns;
 mod fields;
 mod keys;
 mod node;
+mod serialized;
 
 pub(crate) use arrays::{Numbers, any_numbers, array, frozen, numbers, numbers_or_nan, to_array};
 pub(crate) use columns::Columns;

@@ -6,6 +6,7 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
+use pyo3::types::PyFloat;
 
 /// Finite numbers of an array, in row-major order.
 pub(crate) struct Numbers {
@@ -56,6 +57,10 @@ pub(crate) fn numbers(
     value: &Bound<'_, PyAny>,
     shape: &[Option<usize>],
 ) -> PyResult<Numbers> {
+    // fast path without a call into NumPy
+    if let ([], Ok(x)) = (shape, value.cast::<PyFloat>()) {
+        return finite(what, name, Numbers { shape: vec![], values: vec![x.value()], whole: false });
+    }
     let array = shaped(what, name, value, shape)?;
     any_numbers(what, name, &array)
 }
@@ -96,10 +101,16 @@ pub(crate) fn numbers_or_nan(
 
 /// Reads finite numbers of any shape.
 pub(crate) fn any_numbers(what: &str, name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<Numbers> {
-    let numbers = copied(what, name, array)?;
+    finite(what, name, copied(what, name, array)?)
+}
+
+/// Checks that all numbers are finite.
+fn finite(what: &str, name: &str, numbers: Numbers) -> PyResult<Numbers> {
     let Some(at) = numbers.values.iter().position(|x| !x.is_finite()) else { return Ok(numbers) };
     let found = numbers.values.get(at).copied().unwrap_or_default();
-    let message = format!("expected finite numbers, got {found} at {}", index(at, &numbers.shape));
+    let place =
+        if numbers.shape.is_empty() { String::new() } else { format!(" at {}", index(at, &numbers.shape)) };
+    let message = format!("expected finite numbers, got {found}{place}");
     Err(errors::argument(what, name, message))
 }
 

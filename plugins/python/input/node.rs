@@ -1,5 +1,6 @@
 //! Conversion between Python values and nodes of a document.
 use super::arrays::{Numbers, any_numbers, array, frozen};
+use super::serialized::serialized;
 use crate::errors;
 use manifactor::config::{Field, MAX_DEPTH, Node, Place, SourceText, Value};
 use manifactor::graph::Variable;
@@ -18,9 +19,9 @@ pub(crate) struct Untagged(pub Arc<dyn Variable>);
 impl Untagged {
     /// Returns the fields as a node, all of whose parts have one place.
     pub(crate) fn node(&self, place: &Place) -> PyResult<Node> {
-        let mut json = serde_json::to_value(&*self.0).map_err(errors::internal)?;
-        json.as_object_mut().map(|fields| fields.shift_remove("type"));
-        Ok(json_node(place, json))
+        let mut node = serialized(&*self.0, place).map_err(errors::internal)?;
+        node.retain(|name| name != "type");
+        Ok(node)
     }
 }
 
@@ -35,8 +36,8 @@ trait Where: Sized {
     /// An item of the value.
     fn item(&self, index: usize) -> Self;
     fn wrong(&self, message: impl Display) -> Self::Wrong;
-    /// Takes a number, which may be infinite or NaN if a reader reports it.
-    fn float(&self, x: f64) -> Result<f64, Self::Wrong>;
+    /// Accepts a value that is not finite only if its reader reports it.
+    fn check_finite(&self, is_finite: bool) -> Result<(), Self::Wrong>;
     /// Reads the numbers of an array, which have to be finite.
     fn numbers(&self, array: &Bound<'_, PyAny>) -> PyResult<Numbers>;
 }
@@ -66,8 +67,8 @@ impl Where for Argument<'_> {
         errors::argument(self.what, &self.path, message)
     }
 
-    fn float(&self, x: f64) -> PyResult<f64> {
-        Ok(x)
+    fn check_finite(&self, _is_finite: bool) -> PyResult<()> {
+        Ok(())
     }
 
     fn numbers(&self, value: &Bound<'_, PyAny>) -> PyResult<Numbers> {
@@ -106,8 +107,8 @@ impl Where for Anywhere {
         Unreadable
     }
 
-    fn float(&self, x: f64) -> Result<f64, Unreadable> {
-        if x.is_finite() { Ok(x) } else { Err(Unreadable) }
+    fn check_finite(&self, is_finite: bool) -> Result<(), Unreadable> {
+        if is_finite { Ok(()) } else { Err(Unreadable) }
     }
 
     fn numbers(&self, value: &Bound<'_, PyAny>) -> PyResult<Numbers> {
@@ -150,7 +151,8 @@ fn nested<W: Where>(at: &W, value: &Bound<'_, PyAny>, depth: usize) -> Result<No
             },
         }
     } else if let Ok(value) = value.cast::<PyFloat>() {
-        Value::Float(at.float(value.value())?)
+        at.check_finite(value.value().is_finite())?;
+        Value::Float(value.value())
     } else if let Ok(text) = value.cast::<PyString>() {
         let text = text.to_cow()?.into_owned();
         return Ok(Node::new(at.place(&text), Value::String(text)));
@@ -173,6 +175,7 @@ fn nested<W: Where>(at: &W, value: &Bound<'_, PyAny>, depth: usize) -> Result<No
         let item = |(i, item): (usize, PyResult<_>)| nested(&at.item(i), &item?, depth + 1);
         Value::Array(items.map(item).collect::<Result<_, W::Wrong>>()?)
     } else if let Ok(value) = value.cast::<Untagged>() {
+        at.check_finite(value.get().0.erased().is_finite())?;
         return Ok(value.get().node(&at.place(""))?);
     } else if value.cast::<PyUntypedArray>().is_ok() || is_array_like(value)? {
         let numbers = at.numbers(value)?;
@@ -192,24 +195,6 @@ fn nested<W: Where>(at: &W, value: &Bound<'_, PyAny>, depth: usize) -> Result<No
 /// too, but documents have their fields.
 fn is_array_like(value: &Bound<'_, PyAny>) -> PyResult<bool> {
     Ok(value.hasattr("__array__")? && !value.hasattr("TANGENT")?)
-}
-
-/// Converts JSON from serde to a node; all parts have one place.
-fn json_node(place: &Place, json: Json) -> Node {
-    let value = match json {
-        Json::Null => Value::Null,
-        Json::Bool(value) => Value::Bool(value),
-        Json::Number(number) => {
-            number.as_i64().map_or(Value::Float(number.as_f64().unwrap_or(f64::NAN)), Value::Integer)
-        }
-        Json::String(text) => Value::String(text),
-        Json::Array(items) => Value::Array(items.into_iter().map(|item| json_node(place, item)).collect()),
-        Json::Object(fields) => {
-            let field = |json| Field { key: place.clone(), node: json_node(place, json) };
-            Value::Table(Box::new(fields.into_iter().map(|(name, json)| (name, field(json))).collect()))
-        }
-    };
-    Node::new(place.clone(), value)
 }
 
 /// Converts numbers to nested arrays.

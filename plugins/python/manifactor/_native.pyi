@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Self, SupportsIndex, final, overload
+from typing import Any, Self, SupportsIndex, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -142,22 +142,18 @@ class Graph:
     """Factors between named variables, and the variables that are fixed."""
 
     def __new__(cls) -> Self: ...
-    @overload
-    def add(self, keys: FactorEntry) -> int: ...
-    @overload
     def add(
         self,
-        keys: _Keys,
-        factor: Factor,
+        keys: _Keys | FactorEntry,
+        factor: Factor | None = None,
         *,
         noise: Noise | float | None = None,
         sigma: float | None = None,
         sigmas: ArrayLike | None = None,
         loss: Loss | None = None,
         name: str | None = None,
-    ) -> int: ...
-    def add(self, keys: _Keys | FactorEntry, factor: Factor | None = None, **options: Any) -> int:
-        """Adds a factor, and returns its index in the graph, from 0: a `FactorEntry`, such as
+    ) -> int:
+        """Adds a factor, and returns its index in the graph, from 0: a `FactorEntry` alone, such as
         `mf.between("x0", "x1", pose, sigma=0.1)`, or the arguments of one."""
     def add_many(
         self,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import manifactor as mf
 import pytest
 
 ROOT = Path(__file__).parents[3]
@@ -35,6 +36,14 @@ def test_the_example_of_a_page_runs(page: str) -> None:
     space: dict[str, object] = {}
     exec(compile(block, page, "exec"), space)  # noqa: S102
     assert space["solution"].converged  # type: ignore[attr-defined]
+
+
+def test_the_factors_of_wheels_and_gnss_fit_their_types() -> None:
+    (block,) = blocks_of("docs/visual-inertial.md")
+    space: dict[str, object] = {}
+    exec(compile(block, "docs/visual-inertial.md", "exec"), space)  # noqa: S102
+    values = mf.Values({0: mf.Se2.identity(), 1: mf.Se2.identity(), "track": mf.Point1(position=[0.5])})
+    assert space["graph"].check(values) == []  # type: ignore[attr-defined]
 
 
 def test_the_quickstart_is_short() -> None:
