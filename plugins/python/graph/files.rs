@@ -4,7 +4,7 @@ use crate::errors;
 use crate::threads::detach;
 use manifactor::config::{Document, Format, read_graph, write_graph};
 use manifactor::formats::{FormatError, GraphFormat, InformationRepair, ReadOptions, read_text};
-use manifactor::graph::{Graph as InnerGraph, Values as InnerValues};
+use manifactor::graph::{Graph as InnerGraph, GraphError, Values as InnerValues};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -25,12 +25,47 @@ pub(crate) fn document(
             return Err(errors::argument("to_document", "format", message));
         }
     };
-    // refuses a document that no reader accepts
+    document_in(py, graph, values, format)
+}
+
+/// Returns a graph as a document, unless no reader would accept it.
+fn document_in(py: Python<'_>, graph: &InnerGraph, values: &InnerValues, format: Format) -> PyResult<String> {
     let (found, written) = detach(py, || (graph.check(values), write_graph(graph, values, format)))?;
     let text = written.map_err(|error| errors::argument("to_document", "graph", error))?;
-    match found.is_empty() {
-        true => Ok(text),
-        false => Err(errors::graph(found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))),
+    fitting(&found)?;
+    Ok(text)
+}
+
+/// Returns a graph as a text in the format of a path's extension, and notes about what the format cannot express.
+#[pyfunction]
+fn formatted(
+    py: Python<'_>,
+    graph: PyRef<'_, Graph>,
+    values: PyRef<'_, Values>,
+    path: PathBuf,
+) -> PyResult<(String, Vec<String>)> {
+    let (graph, values) = (&*graph.0, &*values.0);
+    if let Some(format) = Format::of_path(&path) {
+        return Ok((document_in(py, graph, values, format)?, vec![]));
+    }
+    let Some(writer) = GraphFormat::by_extension(&path).and_then(|format| format.format) else {
+        let written = GraphFormat::all().into_iter().filter(|format| format.format.is_some());
+        let others: String =
+            written.flat_map(|format| format.extensions).map(|e| format!(", .{e}")).collect();
+        let message =
+            format!("{}: expected one of the extensions .toml, .json, .yaml{others}", path.display());
+        return Err(errors::argument("save", "path", message));
+    };
+    let (found, written) = detach(py, || (graph.check(values), writer(graph, values)))?;
+    fitting(&found)?;
+    Ok(written)
+}
+
+/// Returns an error if there are mistakes between a graph and its values.
+fn fitting(found: &[GraphError]) -> PyResult<()> {
+    match found {
+        [] => Ok(()),
+        found => Err(errors::graph(found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))),
     }
 }
 
@@ -87,5 +122,6 @@ fn unreadable(error: FormatError) -> PyErr {
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(read, module)?)
+    module.add_function(wrap_pyfunction!(read, module)?)?;
+    module.add_function(wrap_pyfunction!(formatted, module)?)
 }

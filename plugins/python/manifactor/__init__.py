@@ -15,9 +15,11 @@
 from __future__ import annotations
 
 import os
+import warnings
 
 from . import detections, errors, factors, functions, losses, solvers, starts, types, variables
 from ._native import FactorEntry, FactorId, Graph, Noise, Smoother, Solution, Values, __version__, between, prior, solve
+from ._native import formatted as _formatted
 from ._native import read as _read
 from .algebra import ValueArray
 from .batched import BatchFactor, batch
@@ -117,11 +119,13 @@ def load(
 
 
 def save(path: str | os.PathLike[str], graph: Graph, values: Values, *, force: bool = False) -> None:
-    """Writes a graph and its values as a document, in the format of the file's extension; `load` and
-    `manifactor solve` read it.
+    """Writes a graph and its values to a file, in the format of its extension: a document (TOML, JSON, YAML), or
+    g2o or BAL. `load` and `manifactor solve` read it.
 
-    An existing file is replaced only with `force`. A graph that does not fit its values is an error.
+    An existing file is replaced only with `force`. A graph that does not fit its values is an error; parts that
+    the format cannot express, such as losses in g2o, are left out with a warning.
     """
-    extension = os.path.splitext(os.fspath(path))[1].removeprefix(".")
-    text = graph.to_document(values, {"yml": "yaml"}.get(extension, extension))
+    text, notes = _formatted(graph, values, path)
+    for note in notes:
+        warnings.warn(note, stacklevel=2)
     written(path, text, force)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import manifactor as mf
@@ -180,3 +181,24 @@ def _of_point(function: Callable[[Any], Any]) -> Callable[..., Any]:
         return function(p)
 
     return residual
+
+
+def test_a_pose_graph_is_saved_as_g2o(tmp_path: Path) -> None:
+    graph, values = mf.Graph(), mf.Values({i: mf.Se2(translation=[1.1 * i, 0], angle=0.1) for i in range(3)})
+    for i in range(2):
+        graph.add(mf.between(i, i + 1, STEP, sigmas=[0.1, 0.1, 0.02]))
+    graph.fix(0)
+    mf.save(tmp_path / "graph.g2o", graph, values)
+    read, start = mf.load(tmp_path / "graph.g2o")
+    assert mf.solve(read, start).cost == pytest.approx(mf.solve(graph, values).cost, abs=1e-9)
+    assert read.cost(start) == pytest.approx(graph.cost(values), rel=1e-9)
+    # g2o has no losses
+    graph.add(mf.between(0, 2, STEP, loss=mf.huber()))
+    with pytest.warns(UserWarning, match="loss"):
+        mf.save(tmp_path / "graph.g2o", graph, values, force=True)
+    with pytest.raises(mf.ArgumentError, match="expected one of the extensions .toml, .json, .yaml, .*.g2o"):
+        mf.save(tmp_path / "graph.txt", graph, values)
+    del values[2]
+    with pytest.raises(mf.GraphError, match="there is no variable `x2`"):
+        mf.save(tmp_path / "other.g2o", graph, values)
+    assert not (tmp_path / "other.g2o").exists()
