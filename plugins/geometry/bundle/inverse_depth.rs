@@ -5,8 +5,8 @@ use manifactor_graph::prelude::*;
 /// A point at `anchor` in one image, with inverse depth λ there, is seen at `pixel` in another image.
 ///
 /// Variables: the pose of the first camera (Rₐ, tₐ), that of the second (R, t), and λ in 1/m, a `point1`. With u the ray of
-/// `anchor`, whose z is 1: r = π(Rᵀ(Rₐ u + λ(tₐ - t))) - z, in pixels. λ = 0 is a point at infinity, of which a short
-/// baseline says no more than a lower bound of the distance; a point in space has no such state. With
+/// `anchor`, whose z is 1: r = π(Rᵀ(Rₐ u + λ(tₐ - t))) - z, in pixels. A short baseline gives only a lower bound of the
+/// distance. λ then goes to 0, a point at infinity, while a point in space would go away without end. With
 /// `body_from_camera`, both poses are those of a body on which the camera is mounted. Rows: x to the right and y down. Not
 /// defined for λ < 0, and if the second camera cannot see the point; the factor is inactive there. Source: Civera,
 /// Davison and Montiel, *Inverse Depth Parametrization for Monocular SLAM*, T-RO 2008, with the ray of the first image

@@ -63,12 +63,29 @@ def building(n: int = 100_000) -> None:
         graph, noise = mf.Graph(), mf.Noise(sigmas=sigmas[0])
         for i in range(n):
             relative = mf.Se3(translation=translation[i], rotation=rotation[i])
-            graph.add([f"x{i}", f"x{i + 1}"], mf.between_se3(relative=relative), noise=noise)
+            graph.add(mf.between(i, i + 1, relative, noise=noise))
 
+    poses = mf.Se3.from_fields({"translation": translation, "rotation": rotation})
+
+    def by_between() -> None:
+        graph, noise = mf.Graph(), mf.Noise(sigmas=sigmas[0])
+        for i in range(n):
+            graph.add(mf.between(i, i + 1, made[i], noise=noise))
+
+    made = list(poses)
     row(f"{n} between factors, `add_many`", least(lambda: seconds(at_once)), "s")
-    row(f"{n} between factors, one by one", seconds(one_by_one), "s")
+    row(f"{n} between factors, `mf.between` of a pose", least(lambda: seconds(by_between)), "s")
+    row(f"{n} between factors, with poses from arrays", least(lambda: seconds(one_by_one)), "s")
     if gtsam is None:
         return
+
+    def by_gtsam_between() -> None:
+        graph, noise = gtsam.NonlinearFactorGraph(), gtsam.noiseModel.Diagonal.Sigmas(sigmas[0])
+        for i in range(n):
+            graph.add(gtsam.BetweenFactorPose3(i, i + 1, theirs[i], noise))
+
+    theirs = [gtsam.Pose3(gtsam.Rot3.Quaternion(w, x, y, z), t) for t, (x, y, z, w) in zip(translation, rotation, strict=True)]
+    row(f"{n} between factors of a pose, gtsam {version('gtsam')}", least(lambda: seconds(by_gtsam_between)), "s")
 
     def by_gtsam() -> None:
         graph, noise = gtsam.NonlinearFactorGraph(), gtsam.noiseModel.Diagonal.Sigmas(sigmas[0])
@@ -77,7 +94,7 @@ def building(n: int = 100_000) -> None:
             pose = gtsam.Pose3(gtsam.Rot3.Quaternion(w, x, y, z), translation[i])
             graph.add(gtsam.BetweenFactorPose3(i, i + 1, pose, noise))
 
-    row(f"{n} between factors, gtsam {version('gtsam')}", least(lambda: seconds(by_gtsam)), "s")
+    row(f"{n} between factors, with poses from arrays, gtsam {version('gtsam')}", least(lambda: seconds(by_gtsam)), "s")
 
 
 @mf.factor

@@ -25,7 +25,7 @@ impl Untagged {
     }
 }
 
-/// Where a value is, for messages.
+/// The place of a value, for messages.
 trait Where: Sized {
     /// The error of a value that no document can hold.
     type Wrong: From<PyErr>;
