@@ -3,8 +3,10 @@ use super::{Noise, check, noise};
 use crate::chosen::{What, factor, factor_of_value, loss, variable};
 use crate::errors;
 use crate::input::{json_to_python, key_of, keys};
+use manifactor::geometry::{Between, Point2, Point3, Prior, Se2, Se3, Sim3, So2, So3};
 use manifactor::graph::{Factor, FactorEntry as Inner, Key};
 use pyo3::prelude::*;
+use std::any::Any;
 use std::sync::Arc;
 
 /// A factor of a graph: a residual between variables, with its noise and loss.
@@ -142,10 +144,31 @@ impl FactorEntry {
     }
 }
 
-/// Makes a factor of the type `<family>_<type of the value>`, whose field is the value.
-fn of_value(family: &str, field: &str, value: &Bound<'_, PyAny>) -> PyResult<Arc<dyn Factor>> {
+/// Makes a factor of the type `<family>_<type of the value>`, whose field is the value. Types of the geometry are made
+/// directly; `typed` makes them, and is `None` for all others, which are read like a document.
+fn of_value(
+    family: &str,
+    field: &str,
+    value: &Bound<'_, PyAny>,
+    typed: fn(&dyn Any) -> Option<Arc<dyn Factor>>,
+) -> PyResult<Arc<dyn Factor>> {
     let value = variable(field, value)?;
+    if let Some(factor) = typed(value.erased().as_any()).filter(|_| value.erased().is_finite()) {
+        return Ok(factor);
+    }
     factor_of_value(&format!("{family}_{}", value.typetag_name()), field, &value)
+}
+
+/// Makes the factor of a value, if its type is one of these.
+macro_rules! typed {
+    ($factor:ident, $field:ident: $($type:ty),+) => {
+        |value| {
+            $(if let Some(value) = value.downcast_ref::<$type>() {
+                return Some(Arc::new($factor { $field: value.clone() }));
+            })+
+            None
+        }
+    };
 }
 
 /// The second variable is at `relative`, seen from the first.
@@ -163,7 +186,12 @@ fn between(
     name: Option<&str>,
 ) -> PyResult<FactorEntry> {
     let keys = vec![key_of("between", first)?, key_of("between", second)?];
-    let factor = of_value("between", "relative", relative)?;
+    let factor = of_value(
+        "between",
+        "relative",
+        relative,
+        typed!(Between, relative: Se2, Se3, Point2, Point3, So2, So3, Sim3),
+    )?;
     let entry = Options { noise, sigma, sigmas, loss, name }.entry("between", keys, factor)?;
     check(&entry, 0)?;
     Ok(FactorEntry(entry))
@@ -181,7 +209,8 @@ fn prior(
     loss: Option<&Bound<'_, PyAny>>,
     name: Option<&str>,
 ) -> PyResult<FactorEntry> {
-    let factor = of_value("prior", "value", value)?;
+    let factor =
+        of_value("prior", "value", value, typed!(Prior, value: Se2, Se3, Point2, Point3, So2, So3, Sim3))?;
     let keys = vec![key_of("prior", key)?];
     let entry = Options { noise, sigma, sigmas, loss, name }.entry("prior", keys, factor)?;
     check(&entry, 0)?;
