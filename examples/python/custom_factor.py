@@ -15,7 +15,6 @@ for i in range(3):
 for i in range(2):
     graph.add(mf.between(i, i + 1, mf.Se2(translation=[2, 0], angle=0), sigmas=[0.2, 0.2, 0.1]))
 
-print(mf.check_factor(position, measured=[1.0, 0.5]))
 solution = mf.solve(graph, values)
 for key, value in solution.values.items():
     print(key, value)
