@@ -16,6 +16,7 @@ __all__ = [
     "accelerometer",
     "bearing_range_se2",
     "bearing_range_se3",
+    "bearing_se3",
     "beside",
     "between_point1",
     "between_point2",
@@ -63,6 +64,7 @@ __all__ = [
     "projection_bal",
     "projection_double_sphere",
     "projection_extended_unified",
+    "projection_inverse_depth",
     "projection_kannala_brandt",
     "projection_radial_tangential",
     "range_se2_point2",
@@ -74,6 +76,7 @@ __all__ = [
     "scaled_between_se3",
     "shape_prior",
     "size_prior",
+    "stereo",
     "supporting_plane",
     "tangent_planes",
     "upright",
@@ -148,6 +151,27 @@ def bearing_range_se3(*, direction: Numbers, range: float) -> Factor:
         range: Measured distance, in metres.
     """
     return Factor("bearing_range_se3", {"direction": direction, "range": range})
+
+
+def bearing_se3(*, direction: Numbers) -> Factor:
+    """A pose in space measures a point in the direction `direction`, at an unknown distance.
+
+    Two rows: the arc from the measured direction to the direction of the point, in radians along two axes perpendicular
+    to the measured direction. The axes are those of `bearing_range_se3`; with an equal σ they do not matter. It suits cameras
+    of any field of view, as it has no image. Not defined within a nanometre of the pose, and within 1e-6 radians of the
+    opposite direction, as the arc has no direction there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "l0"]
+    factor = { type = "bearing_se3", direction = [1.0, 0.0, 0.2] }
+    noise = { sigma = 0.002 }
+    ```
+
+    Args:
+        direction: Measured direction in the frame of the pose, of any length but zero.
+    """
+    return Factor("bearing_se3", {"direction": direction})
 
 
 def beside(*, gap: float | None = None, up: Numbers | None = None) -> Factor:
@@ -1339,6 +1363,45 @@ def projection_extended_unified(
     return Factor("projection_extended_unified", {"pixel": pixel, "camera": camera, "body_from_camera": body_from_camera})
 
 
+def projection_inverse_depth(
+    *,
+    anchor: Numbers,
+    pixel: Numbers,
+    camera: types.Camera,
+    body_from_camera: types.Se3 | None = None,
+) -> Factor:
+    """A point at `anchor` in one image, with inverse depth λ there, is seen at `pixel` in another image.
+
+    Variables: the pose of the first camera (Rₐ, tₐ), that of the second (R, t), and λ in 1/m, a `point1`. With u the ray of
+    `anchor`, whose z is 1: r = π(Rᵀ(Rₐ u + λ(tₐ - t))) - z, in pixels. A short baseline gives only a lower bound of the
+    distance. λ then goes to 0, a point at infinity, while a point in space would go away without end. With
+    `body_from_camera`, both poses are those of a body on which the camera is mounted. Rows: x to the right and y down. Not
+    defined for λ < 0, and if the second camera cannot see the point; the factor is inactive there. Source: Civera,
+    Davison and Montiel, *Inverse Depth Parametrization for Monocular SLAM*, T-RO 2008, with the ray of the first image
+    as a constant.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "x1", "d0"]
+    noise = { sigma = 1.0 }
+
+    [factors.factor]
+    type = "projection_inverse_depth"
+    anchor = [350.0, 240.0]
+    pixel = [310.0, 262.5]
+    camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }
+    ```
+
+    Args:
+        anchor: Pixel in the first image, x right and y down.
+        pixel: Measured pixel in the second image.
+        camera: The calibrated camera of both images.
+        body_from_camera: Pose of the camera in the frame of the poses. Default: the poses are those of
+            the camera.
+    """
+    return Factor("projection_inverse_depth", {"anchor": anchor, "pixel": pixel, "camera": camera, "body_from_camera": body_from_camera})
+
+
 def projection_kannala_brandt(
     *,
     pixel: Numbers,
@@ -1572,6 +1635,46 @@ def size_prior(*, semi_axes: Numbers, order: Literal['sorted', 'as_given'] | Non
         order: Order of the semi-axes in the comparison. Default: "sorted".
     """
     return Factor("size_prior", {"semi_axes": semi_axes, "order": order})
+
+
+def stereo(
+    *,
+    pixel: Numbers,
+    right: float,
+    baseline: float,
+    camera: types.Camera,
+    body_from_camera: types.Se3 | None = None,
+) -> Factor:
+    """A stereo camera sees a point at `pixel` in its left image, and in the same row at `right` in its right one.
+
+    With q = (x, y, z) = Rᵀ(X - t) the point in the frame of the left camera, b the baseline and π the projection:
+    r = (π(q) - pixel, π(q - (b, 0, 0))ᵤ - right), in pixels. Variables: the pose of the left camera, from its own frame
+    (z forward) to the world's, and the point. With `body_from_camera`, the pose is that of a body on which the camera
+    is mounted. Rows: u and v in the left image, u in the right one. Not defined if the point is behind the camera; the
+    factor is inactive there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "l0"]
+    noise = { sigma = 1.0 }
+
+    [factors.factor]
+    type = "stereo"
+    pixel = [310.0, 262.5]
+    right = 295.0
+    baseline = 0.12
+    camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }
+    ```
+
+    Args:
+        pixel: Measured pixel in the left image, x right and y down.
+        right: Measured x in the right image, in pixels.
+        baseline: Distance of the right camera to the right of the left one, in metres.
+        camera: Both cameras, after rectification.
+        body_from_camera: Pose of the left camera in the frame of the variable. Default: the variable is
+            the pose of the left camera.
+    """
+    return Factor("stereo", {"pixel": pixel, "right": right, "baseline": baseline, "camera": camera, "body_from_camera": body_from_camera})
 
 
 def supporting_plane() -> Factor:
