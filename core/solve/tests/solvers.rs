@@ -342,3 +342,29 @@ fn a_factor_on_a_thousand_variables_is_compiled() {
     let sum: f64 = (0..1000).map(|i| f64::from(i).powi(2)).sum();
     assert!((problem.linearize().cost - 0.5 * (sum + 499.5_f64.powi(2) + 1.0)).abs() < 1e-3);
 }
+
+#[test]
+fn the_cost_of_a_graph_is_that_of_a_solve() {
+    let (mut graph, mut values) = chain(5);
+    graph
+        .add(["p1", "p3"], Apart { by: [0.0, 5.0] })
+        .noise(Noise::sigma(0.1).unwrap())
+        .loss(Cauchy::default());
+    for solver in solvers() {
+        let solution = run(&graph, &values, &*solver);
+        let (before, after) = (graph.cost(&values).unwrap(), graph.cost(&solution.values).unwrap());
+        assert!((before / solution.outcome.initial_cost - 1.0).abs() < 1e-12, "{before}");
+        assert!((after / solution.outcome.final_cost - 1.0).abs() < 1e-9, "{after}");
+    }
+    // no variable has to be free, and a factor that is not defined does not count
+    let before = graph.cost(&values).unwrap();
+    (0..5).for_each(|i| graph.fix(format!("p{i}")));
+    graph.add(["p2"], Cliff {});
+    assert!(graph.cost(&values).unwrap() > before);
+    // its residual is NaN
+    values.insert("p2", Plane { x: -1.0, y: 0.0 });
+    assert!(graph.cost(&values).unwrap().is_nan());
+    values.remove("p2");
+    let wrong = graph.cost(&values).unwrap_err();
+    assert!(wrong.iter().all(|error| error.to_string().contains("`p2`")), "{wrong:?}");
+}
