@@ -14,7 +14,7 @@ for j in range(12):
 for i in range(21):
     values[i] = guess
     seen = pose.inverse() @ landmarks
-    for j in np.flatnonzero(np.linalg.norm(seen, axis=1) < 8):
+    for j in np.flatnonzero(np.linalg.norm(seen, axis=1) < 8).tolist():
         bearing = np.arctan2(seen[j, 1], seen[j, 0]) + random.normal(0, 0.02)
         distance = np.linalg.norm(seen[j]) + random.normal(0, 0.1)
         graph.add([i, ("l", j)], mf.bearing_range_se2(bearing=bearing, range=distance), sigmas=[0.02, 0.1])

@@ -2,7 +2,7 @@
 
 import manifactor as mf
 
-CAMERA = {"fx": 1000, "fy": 1000, "cx": 320, "cy": 240, "width": 640, "height": 480}
+CAMERA = mf.types.Camera(fx=1000, fy=1000, cx=320, cy=240, width=640, height=480)
 
 graph = mf.Graph()
 graph.fix("x1")

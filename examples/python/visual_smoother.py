@@ -5,7 +5,7 @@ import itertools
 import manifactor as mf
 import numpy as np
 
-CAMERA = {"fx": 500, "fy": 500, "cx": 320, "cy": 240, "width": 640, "height": 480}
+CAMERA = mf.types.Camera(fx=500, fy=500, cx=320, cy=240, width=640, height=480)
 
 points = 10.0 * np.array(list(itertools.product([-1, 1], repeat=3)))
 circle = 2 * np.pi * np.arange(10) / 10

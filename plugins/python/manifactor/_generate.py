@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import keyword
+import re
 import textwrap
 import tomllib
 from pathlib import Path
@@ -67,7 +68,7 @@ class Types:
                 # an optional field, whose parameter accepts None in any case
                 return self.hint({**schema, "type": of}, definitions, owner, within)
             case "number":
-                return "float"
+                return "Number"
             case "integer":
                 return "int"
             case "boolean":
@@ -85,7 +86,7 @@ class Types:
 
     def array(self, schema: Schema, definitions: Schema, owner: str, within: bool) -> str:
         item = self.hint(schema.get("items", {}), definitions, owner, within)
-        return "Numbers" if item in ("float", "int") else f"Sequence[{item}]"
+        return {"Number": "Numbers", "int": "Numbers", "Numbers": "Rows"}.get(item, f"Sequence[{item}]")
 
     def union(self, schemas: list[Schema], definitions: Schema, owner: str, within: bool) -> str:
         hints: list[str] = []
@@ -189,7 +190,7 @@ def imports(body: str, kind: str, used: set[str]) -> str:
     if modules:
         local.append(f"from . import {', '.join(modules)}")
     names = {CLASSES.get(kind, "")} | used
-    names |= {name for name in ("Fields", "Numbers", "untagged") if name in body}
+    names |= {name for name in ("Fields", "Number", "Numbers", "Rows", "untagged") if re.search(rf"\b{name}\b", body)}
     native = sorted(names & {"Noise", "untagged"})
     if native:
         local.append(f"from ._native import {', '.join(native)}")
@@ -292,7 +293,7 @@ def module_of_variables(entries: list[Schema], functions: list[Schema], types: T
             f'        return super().__new__(cls, "variable", "{entry["name"]}", {fields_of(fields)})',
         ]
         for field, hint, _, _ in fields:
-            what = "float" if hint == "float" else "NDArray[np.float64]"
+            what = "float" if hint == "Number" else "NDArray[np.float64]"
             about = one_line(entry["schema"]["properties"][field].get("description", ""))
             lines += ["", "    @property", f"    def {safe(field)}(self) -> {what}:", f'        """{about}"""']
             lines += [f'        return self.__getattr__("{field}")  # type: ignore[no-any-return]']
@@ -304,7 +305,7 @@ def module_of_variables(entries: list[Schema], functions: list[Schema], types: T
     head = HEADER.format(about="Every type of variables that is linked, as a class of its values.")
     head += "\nfrom collections.abc import Mapping\nfrom typing import Any, ClassVar, Self\n"
     head += "\nimport numpy as np\nfrom numpy.typing import NDArray\n"
-    head += "\nfrom .chosen import Numbers, Variable, computed\nfrom .groups import Group, SpatialPose, SpatialRotation, Vector\n"
+    head += "\nfrom .chosen import Number, Numbers, Variable, computed\nfrom .groups import Group, SpatialPose, SpatialRotation, Vector\n"
     head += "\n__all__ = [\n" + "".join(f'    "{camel(entry["name"])}",\n' for entry in entries) + "]\n"
     return head + "\n\n" + body + named
 
@@ -327,10 +328,10 @@ def module_of_types(types: Types) -> str:
     sequences = "\nfrom collections.abc import Sequence\n" if "Sequence[" in body else ""
     typing = [name for name in ("Any", "Literal", "Required") if f"{name}[" in body or f": {name}" in body or f"| {name}" in body]
     head = HEADER.format(about="Tables of fields within factors, losses and solvers.")
-    head += sequences + f"from typing import {', '.join([*typing, 'TypedDict'])}\n"
+    head += (sequences or "\n") + f"from typing import {', '.join([*typing, 'TypedDict'])}\n"
     if "Noise" in body:
         head += "\nfrom ._native import Noise"
-    names = [n for n in ("Factor", "Fields", "Loss", "Numbers", "Solver", "Variable") if f"{n} " in body or f"{n}\n" in body or f"{n}]" in body]
+    names = [n for n in ("Factor", "Fields", "Loss", "Number", "Numbers", "Rows", "Solver", "Variable") if re.search(rf"(: |\W){n}\b(?! of)", body)]
     return head + f"\nfrom .chosen import {', '.join(names)}\n\n\n" + body + "\n"
 
 

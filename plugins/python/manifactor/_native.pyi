@@ -191,7 +191,7 @@ class Graph:
     def to_document(self, values: Values, format: str = "toml") -> str:
         """Returns the graph and its values as a document in `toml`, `json` or `yaml`, which `manifactor
         solve` reads."""
-    def __getitem__(self, at: int) -> FactorEntry:
+    def __getitem__(self, at: SupportsIndex) -> FactorEntry:
         """The factor at an index, from 0."""
     def __iter__(self) -> Iterator[FactorEntry]: ...
     def __len__(self) -> int: ...

@@ -130,7 +130,7 @@ class ValueArray(Operators, _native.ValueArray, Generic[V]):
         return unchangeable(fields[name]) if name in fields else _native.call(name, self)
 
     @overload
-    def __getitem__(self, index: int) -> V: ...
+    def __getitem__(self, index: int) -> V: ...  # pyright: ignore[reportOverlappingOverload]
     @overload
     def __getitem__(self, index: slice | ArrayLike) -> ValueArray[V]: ...
     def __getitem__(self, index: Any) -> Any:

@@ -13,8 +13,12 @@ from ._native import Chosen
 from .algebra import Operators, ValueArray, interpolated
 from .errors import ArgumentError, Mistake
 
+#: A number of Python or of NumPy.
+Number = float | np.floating[Any]
 #: A sequence of numbers: a list, a tuple, or an array with one axis.
-Numbers = Sequence[float] | NDArray[Any]
+Numbers = Sequence[Number] | NDArray[Any]
+#: Rows of numbers: a sequence of sequences, or an array with two axes.
+Rows = Sequence[Numbers] | NDArray[Any]
 #: Fields by name, as in a document.
 Fields = Mapping[str, Any]
 
@@ -95,7 +99,7 @@ class Variable(Operators, Chosen):
         return _native.local(self, to)
 
     @overload
-    def interpolate(self, to: Self, t: float) -> Self: ...
+    def interpolate(self, to: Self, t: float) -> Self: ...  # pyright: ignore[reportOverlappingOverload]
     @overload
     def interpolate(self, to: Self | ValueArray[Self], t: ArrayLike) -> ValueArray[Self]: ...
     def interpolate(self, to: Any, t: ArrayLike) -> Any:

@@ -9,7 +9,7 @@ from typing import Literal
 
 from . import types, variables
 from ._native import Noise, untagged
-from .chosen import Factor, Fields, Numbers
+from .chosen import Factor, Fields, Number, Numbers, Rows
 
 
 __all__ = [
@@ -108,7 +108,7 @@ def accelerometer(*, measured: Numbers) -> Factor:
     return Factor("accelerometer", {"measured": measured})
 
 
-def bearing_range_se2(*, bearing: float, range: float) -> Factor:
+def bearing_range_se2(*, bearing: Number, range: Number) -> Factor:
     """A pose in the plane measures a point at the distance `range` in the direction `bearing`: r = (atan2(q) -
     β, ‖q‖ - d), q = Rᵀ(p - t).
 
@@ -130,7 +130,7 @@ def bearing_range_se2(*, bearing: float, range: float) -> Factor:
     return Factor("bearing_range_se2", {"bearing": bearing, "range": range})
 
 
-def bearing_range_se3(*, direction: Numbers, range: float) -> Factor:
+def bearing_range_se3(*, direction: Numbers, range: Number) -> Factor:
     """A pose in space measures a point at the distance `range` in the direction `direction`.
 
     Three rows: the arc from the measured direction to the direction of the point, in radians along two axes
@@ -174,7 +174,7 @@ def bearing_se3(*, direction: Numbers) -> Factor:
     return Factor("bearing_se3", {"direction": direction})
 
 
-def beside(*, gap: float | None = None, up: Numbers | None = None) -> Factor:
+def beside(*, gap: Number | None = None, up: Numbers | None = None) -> Factor:
     """Two objects stand side by side with a given gap: r = |h| - e₀ - e₁ - gap, in metres.
 
     h is the vector between the two centroids without its component along `up`; u = h/|h|, and eᵢ is half the
@@ -382,7 +382,7 @@ def bounding_box(
     return Factor("bounding_box", {"box": box, "camera": camera, "model": model})
 
 
-def centroid_depth(*, depth: float) -> Factor:
+def centroid_depth(*, depth: Number) -> Factor:
     """A camera measures the depth of an object's centre: r = (Rᵀ(c - t))ᶻ - depth, c the centroid, R and t the
     camera's pose.
 
@@ -462,7 +462,7 @@ def conic_distance(
     centre: Numbers,
     semi_axes: Numbers,
     camera: types.Camera,
-    angle: float | None = None,
+    angle: Number | None = None,
 ) -> Factor:
     """A detector measures the outline of an object as an ellipse: r = (μ - μ₀, A^½ U - A₀^½), in pixels.
 
@@ -491,7 +491,7 @@ def conic_distance(
     return Factor("conic_distance", {"centre": centre, "semi_axes": semi_axes, "camera": camera, "angle": angle})
 
 
-def constant_velocity(*, seconds: float) -> Factor:
+def constant_velocity(*, seconds: Number) -> Factor:
     """A body moves between two poses with constant velocity: r = (Log(Xᵢ⁻¹ Xⱼ) − vᵢ Δt, vⱼ − vᵢ).
 
     Velocities are in the frame of the body. For white noise on the acceleration, the covariance grows with
@@ -691,7 +691,7 @@ def expression(
 
 def heading_se3(
     *,
-    heading: float,
+    heading: Number,
     axis: Numbers | None = None,
     zero: Numbers | None = None,
     up: Numbers | None = None,
@@ -766,8 +766,8 @@ def horizontal_orientation_smooth(*, up: Numbers | None = None) -> Factor:
 def imu(
     *,
     seconds: Numbers,
-    gyroscope: Sequence[Numbers],
-    accelerometer: Sequence[Numbers],
+    gyroscope: Rows,
+    accelerometer: Rows,
     noise: types.ImuDensities | None = None,
     bias: types.ImuBias | None = None,
     gravity: Numbers | None = None,
@@ -1454,7 +1454,7 @@ def projection_radial_tangential(
     return Factor("projection_radial_tangential", {"pixel": pixel, "camera": camera, "body_from_camera": body_from_camera})
 
 
-def range_se2_point2(*, range: float) -> Factor:
+def range_se2_point2(*, range: Number) -> Factor:
     """Two variables are `range` apart: r = ‖t₂ - t₁‖ - z.
 
     One row, in metres. At distance zero there is no direction to move in: within a nanometre the factor is not defined, and takes no part.
@@ -1472,7 +1472,7 @@ def range_se2_point2(*, range: float) -> Factor:
     return Factor("range_se2_point2", {"range": range})
 
 
-def range_se2_se2(*, range: float) -> Factor:
+def range_se2_se2(*, range: Number) -> Factor:
     """Two variables are `range` apart: r = ‖t₂ - t₁‖ - z.
 
     One row, in metres. At distance zero there is no direction to move in: within a nanometre the factor is not defined, and takes no part.
@@ -1490,7 +1490,7 @@ def range_se2_se2(*, range: float) -> Factor:
     return Factor("range_se2_se2", {"range": range})
 
 
-def range_se3_point3(*, range: float) -> Factor:
+def range_se3_point3(*, range: Number) -> Factor:
     """Two variables are `range` apart: r = ‖t₂ - t₁‖ - z.
 
     One row, in metres. At distance zero there is no direction to move in: within a nanometre the factor is not defined, and takes no part.
@@ -1508,7 +1508,7 @@ def range_se3_point3(*, range: float) -> Factor:
     return Factor("range_se3_point3", {"range": range})
 
 
-def range_se3_se3(*, range: float) -> Factor:
+def range_se3_se3(*, range: Number) -> Factor:
     """Two variables are `range` apart: r = ‖t₂ - t₁‖ - z.
 
     One row, in metres. At distance zero there is no direction to move in: within a nanometre the factor is not defined, and takes no part.
@@ -1640,8 +1640,8 @@ def size_prior(*, semi_axes: Numbers, order: Literal['sorted', 'as_given'] | Non
 def stereo(
     *,
     pixel: Numbers,
-    right: float,
-    baseline: float,
+    right: Number,
+    baseline: Number,
     camera: types.Camera,
     body_from_camera: types.Se3 | None = None,
 ) -> Factor:

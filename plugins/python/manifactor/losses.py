@@ -4,7 +4,7 @@ Written by `python -m manifactor._generate` from the catalogue."""
 
 from __future__ import annotations
 
-from .chosen import Loss
+from .chosen import Loss, Number
 
 
 __all__ = [
@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 
-def cauchy(*, scale: float | None = None) -> Loss:
+def cauchy(*, scale: Number | None = None) -> Loss:
     """Grows with the logarithm: ρ = k² ln(1 + s/k²).
 
     ```toml
@@ -34,7 +34,7 @@ def cauchy(*, scale: float | None = None) -> Loss:
     return Loss("cauchy", {"scale": scale})
 
 
-def dcs(*, scale: float | None = None) -> Loss:
+def dcs(*, scale: Number | None = None) -> Loss:
     """Dynamic covariance scaling: squares up to s = k, weight (2k/(k + s))² beyond.
 
     Unlike in the other losses, the scale Φ = k is in units of s, i.e. squared σ's (Agarwal et al., ICRA
@@ -51,7 +51,7 @@ def dcs(*, scale: float | None = None) -> Loss:
     return Loss("dcs", {"scale": scale})
 
 
-def fair(*, scale: float | None = None) -> Loss:
+def fair(*, scale: Number | None = None) -> Loss:
     """Between squares and the norm: ρ = 2k² (√s/k - ln(1 + √s/k)).
 
     ```toml
@@ -64,7 +64,7 @@ def fair(*, scale: float | None = None) -> Loss:
     return Loss("fair", {"scale": scale})
 
 
-def geman_mcclure(*, scale: float | None = None) -> Loss:
+def geman_mcclure(*, scale: Number | None = None) -> Loss:
     """Saturates at k²: ρ = k² s / (k² + s).
 
     ```toml
@@ -77,7 +77,7 @@ def geman_mcclure(*, scale: float | None = None) -> Loss:
     return Loss("geman_mcclure", {"scale": scale})
 
 
-def huber(*, scale: float | None = None) -> Loss:
+def huber(*, scale: Number | None = None) -> Loss:
     """Squares up to the scale k, linear beyond: ρ = s for √s ≤ k, 2k√s - k² beyond.
 
     ```toml
@@ -90,7 +90,7 @@ def huber(*, scale: float | None = None) -> Loss:
     return Loss("huber", {"scale": scale})
 
 
-def l1(*, scale: float | None = None) -> Loss:
+def l1(*, scale: Number | None = None) -> Loss:
     """The norm instead of its square: ρ = 2k√s.
 
     The scale is the slope: half the cost of one more σ. The weight k/√s has no bound; below √s = 1e-6 k
@@ -116,7 +116,7 @@ def l2() -> Loss:
     return Loss("l2", {})
 
 
-def tempered(*, tau: float, loss: Loss) -> Loss:
+def tempered(*, tau: Number, loss: Loss) -> Loss:
     """A loss at a different temperature: ρ(τs)/τ.
 
     If τ residuals of a kind carry the information of one, their σ is multiplied by √τ. This loss still
@@ -135,7 +135,7 @@ def tempered(*, tau: float, loss: Loss) -> Loss:
     return Loss("tempered", {"tau": tau, "loss": loss})
 
 
-def tukey(*, scale: float | None = None) -> Loss:
+def tukey(*, scale: Number | None = None) -> Loss:
     """Ignores residuals beyond the scale: ρ = k²/3 (1 - (1 - s/k²)³) up to √s = k, k²/3 beyond.
 
     ```toml
@@ -148,7 +148,7 @@ def tukey(*, scale: float | None = None) -> Loss:
     return Loss("tukey", {"scale": scale})
 
 
-def welsch(*, scale: float | None = None) -> Loss:
+def welsch(*, scale: Number | None = None) -> Loss:
     """Saturates at k², faster: ρ = k² (1 - exp(-s/k²)).
 
     ```toml

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from . import types, variables
-from .chosen import Numbers, Solver
+from .chosen import Number, Numbers, Solver
 
 
 __all__ = [
@@ -51,7 +51,7 @@ def auto(*, stop: types.Stopping | None = None, linear: types.LinearSolver | Non
 
 def dogleg(
     *,
-    initial_radius: float | None = None,
+    initial_radius: Number | None = None,
     stop: types.Stopping | None = None,
     linear: types.LinearSolver | None = None,
 ) -> Solver:
@@ -102,12 +102,12 @@ def gauss_newton(*, stop: types.Stopping | None = None, linear: types.LinearSolv
 def gnc(
     *,
     cost: Literal['truncated_least_squares', 'geman_mcclure'] | None = None,
-    probability: float | None = None,
-    threshold: float | None = None,
+    probability: Number | None = None,
+    threshold: Number | None = None,
     candidates: Literal['loop_closures', 'all'] | None = None,
     types: Sequence[str] | None = None,
     inliers: Numbers | None = None,
-    step: float | None = None,
+    step: Number | None = None,
     solver: Solver | None = None,
 ) -> Solver:
     """Rejects outliers: solves with all factors, then with decreasing weights on factors that do not fit.
@@ -146,10 +146,10 @@ def gnc(
 
 def levenberg_marquardt(
     *,
-    initial_lambda: float | None = None,
-    min_lambda: float | None = None,
-    max_lambda: float | None = None,
-    decrease: float | None = None,
+    initial_lambda: Number | None = None,
+    min_lambda: Number | None = None,
+    max_lambda: Number | None = None,
+    decrease: Number | None = None,
     diagonal: Numbers | None = None,
     stop: types.Stopping | None = None,
     linear: types.LinearSolver | None = None,

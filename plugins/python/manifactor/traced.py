@@ -47,7 +47,7 @@ def shape_of(name: str, value: Any) -> str:
         return str(value_class(value).SHAPE)
     if isinstance(value, bool | str):
         wrong(f"`{name}`: expected a number, a vector or a value such as Se3(…), got {value!r}")
-    axes = np.shape(value)
+    axes = np.asarray(value).shape
     if axes == ():
         return "number"
     if len(axes) == 1 and axes[0] in VECTORS:

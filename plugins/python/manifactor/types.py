@@ -3,25 +3,26 @@
 Written by `python -m manifactor._generate` from the catalogue."""
 
 from __future__ import annotations
+
 from typing import Any, Literal, Required, TypedDict
 
 from ._native import Noise
-from .chosen import Factor, Numbers, Solver
+from .chosen import Factor, Number, Numbers
 
 
 class Camera(TypedDict, total=False):
     """A pinhole camera: u = fx x/z + skew y/z + cx, v = fy y/z + cy. x is right, y down, z forward."""
 
     #: Focal length along x, in pixels.
-    fx: Required[float]
+    fx: Required[Number]
     #: Focal length along y, in pixels.
-    fy: Required[float]
+    fy: Required[Number]
     #: Principal point, in pixels.
-    cx: Required[float]
+    cx: Required[Number]
     #: Principal point, in pixels.
-    cy: Required[float]
+    cy: Required[Number]
     #: Contribution of y/z to u, in pixels.
-    skew: float
+    skew: Number
     #: Size of the image, in pixels.
     width: Required[int]
     #: Size of the image, in pixels.
@@ -32,13 +33,13 @@ class ImuDensities(TypedDict, total=False):
     """Noise of an IMU: spectral densities, as in its datasheet or from its Allan variance."""
 
     #: White noise of the gyroscope, in rad/s/√Hz.
-    gyroscope: float
+    gyroscope: Number
     #: White noise of the accelerometer, in m/s²/√Hz.
-    accelerometer: float
+    accelerometer: Number
     #: Random walk of the gyroscope's bias, in rad/s²/√Hz.
-    gyroscope_walk: float
+    gyroscope_walk: Number
     #: Random walk of the accelerometer's bias, in m/s³/√Hz.
-    accelerometer_walk: float
+    accelerometer_walk: Number
 
 
 class ImuBias(TypedDict, total=False):
@@ -55,7 +56,7 @@ class Component(TypedDict, total=False):
     """One alternative of a mixture."""
 
     #: Likelihood relative to the remaining components.
-    weight: Required[float]
+    weight: Required[Number]
     #: Factor of this alternative. Default: none.
     factor: Factor | None
     #: Variables that the factor uses, as indices into `keys` from 0, in the order of the factor. Default: all
@@ -79,55 +80,55 @@ class DoubleSphere(TypedDict, total=False):
     """A fisheye camera with two parameters."""
 
     #: Focal length along x, in pixels.
-    fx: Required[float]
+    fx: Required[Number]
     #: Focal length along y, in pixels.
-    fy: Required[float]
+    fy: Required[Number]
     #: Principal point, in pixels.
-    cx: Required[float]
+    cx: Required[Number]
     #: Principal point, in pixels.
-    cy: Required[float]
+    cy: Required[Number]
     #: Size of the image, in pixels.
     width: Required[int]
     #: Size of the image, in pixels.
     height: Required[int]
     #: Distance ξ of the spheres' centres, above -1 and up to 1.
-    xi: Required[float]
+    xi: Required[Number]
     #: Place α of the pinhole, from 0 to 1.
-    alpha: Required[float]
+    alpha: Required[Number]
 
 
 class ExtendedUnified(TypedDict, total=False):
     """A fisheye camera with two parameters."""
 
     #: Focal length along x, in pixels.
-    fx: Required[float]
+    fx: Required[Number]
     #: Focal length along y, in pixels.
-    fy: Required[float]
+    fy: Required[Number]
     #: Principal point, in pixels.
-    cx: Required[float]
+    cx: Required[Number]
     #: Principal point, in pixels.
-    cy: Required[float]
+    cy: Required[Number]
     #: Size of the image, in pixels.
     width: Required[int]
     #: Size of the image, in pixels.
     height: Required[int]
     #: Share α of the distance in the depth, from 0 to 1.
-    alpha: Required[float]
+    alpha: Required[Number]
     #: Weight β of the distance from the optical axis.
-    beta: Required[float]
+    beta: Required[Number]
 
 
 class KannalaBrandt(TypedDict, total=False):
     """A fisheye camera with four coefficients."""
 
     #: Focal length along x, in pixels.
-    fx: Required[float]
+    fx: Required[Number]
     #: Focal length along y, in pixels.
-    fy: Required[float]
+    fy: Required[Number]
     #: Principal point, in pixels.
-    cx: Required[float]
+    cx: Required[Number]
     #: Principal point, in pixels.
-    cy: Required[float]
+    cy: Required[Number]
     #: Size of the image, in pixels.
     width: Required[int]
     #: Size of the image, in pixels.
@@ -140,13 +141,13 @@ class RadialTangential(TypedDict, total=False):
     """A camera with radial and tangential lens distortion, with four, five or eight coefficients."""
 
     #: Focal length along x, in pixels.
-    fx: Required[float]
+    fx: Required[Number]
     #: Focal length along y, in pixels.
-    fy: Required[float]
+    fy: Required[Number]
     #: Principal point, in pixels.
-    cx: Required[float]
+    cx: Required[Number]
     #: Principal point, in pixels.
-    cy: Required[float]
+    cy: Required[Number]
     #: Size of the image, in pixels.
     width: Required[int]
     #: Size of the image, in pixels.
@@ -162,13 +163,13 @@ class Stopping(TypedDict, total=False):
     max_iterations: int
     #: Stop once a step changes the cost by less than this share of it. Default: 1e-8. With at most 32
     #: unknowns, steps continue to 1e-15, which is rounding error, as long as there are iterations.
-    relative_cost: float
+    relative_cost: Number
     #: Stop once the cost is below this.
-    absolute_cost: float
+    absolute_cost: Number
     #: Stop once no entry of the gradient is larger than this.
-    gradient: float
+    gradient: Number
     #: Stop once the Euclidean norm of a step is below this.
-    step: float
+    step: Number
 
 
 class LinearSolver(TypedDict, total=False):
@@ -185,7 +186,7 @@ class LinearSolver(TypedDict, total=False):
     #: Stopping criteria and preconditioner of conjugate gradients.
     conjugate_gradients: ConjugateGradients
     #: Maximum memory of the factor, in GiB. Default: the available memory of the system.
-    memory_gib: float
+    memory_gib: Number
 
 
 class ConjugateGradients(TypedDict, total=False):
@@ -194,7 +195,7 @@ class ConjugateGradients(TypedDict, total=False):
     #: The preconditioner.
     preconditioner: Literal['block_jacobi', 'schur_jacobi']
     #: Stop once the residual is this share of the right-hand side, in the preconditioner's norm.
-    tolerance: float
+    tolerance: Number
     #: Maximum number of iterations. The step is then the best one so far, which still lowers the quadratic
     #: model.
     max_iterations: int

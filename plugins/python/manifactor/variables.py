@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .chosen import Numbers, Variable, computed
+from .chosen import Number, Numbers, Variable, computed
 from .groups import Group, SpatialPose, SpatialRotation, Vector
 
 __all__ = [
@@ -68,9 +68,9 @@ class BalCamera(Variable):
         *,
         translation: Numbers,
         rotation: Numbers,
-        focal_length: float,
-        k1: float,
-        k2: float,
+        focal_length: Number,
+        k1: Number,
+        k2: Number,
     ) -> Self:
         return super().__new__(cls, "variable", "bal_camera", {"translation": translation, "rotation": rotation, "focal_length": focal_length, "k1": k1, "k2": k2})
 
@@ -218,7 +218,7 @@ class Plane(Variable):
     TANGENT: ClassVar[tuple[str, ...]] = ("a", "b", "offset")
     FIELDS: ClassVar[Mapping[str, int | slice]] = {"normal": slice(0, 3), "offset": 3}
 
-    def __new__(cls, *, normal: Numbers, offset: float) -> Self:
+    def __new__(cls, *, normal: Numbers, offset: Number) -> Self:
         return super().__new__(cls, "variable", "plane", {"normal": normal, "offset": offset})
 
     @property
@@ -669,7 +669,7 @@ class Se2(Group):
     TANGENT: ClassVar[tuple[str, ...]] = ("x", "y", "theta")
     FIELDS: ClassVar[Mapping[str, int | slice]] = {"translation": slice(3, 5), "angle": 0}
 
-    def __new__(cls, *, translation: Numbers, angle: float) -> Self:
+    def __new__(cls, *, translation: Numbers, angle: Number) -> Self:
         return super().__new__(cls, "variable", "se2", {"translation": translation, "angle": angle})
 
     @property
@@ -756,7 +756,7 @@ class Sim3(Group):
     TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz", "x", "y", "z", "log_scale")
     FIELDS: ClassVar[Mapping[str, int | slice]] = {"translation": slice(4, 7), "rotation": slice(0, 4), "scale": 7}
 
-    def __new__(cls, *, translation: Numbers, rotation: Numbers, scale: float) -> Self:
+    def __new__(cls, *, translation: Numbers, rotation: Numbers, scale: Number) -> Self:
         return super().__new__(cls, "variable", "sim3", {"translation": translation, "rotation": rotation, "scale": scale})
 
     @property
@@ -799,7 +799,7 @@ class So2(Group):
     TANGENT: ClassVar[tuple[str, ...]] = ("theta",)
     FIELDS: ClassVar[Mapping[str, int | slice]] = {"angle": 0}
 
-    def __new__(cls, *, angle: float) -> Self:
+    def __new__(cls, *, angle: Number) -> Self:
         return super().__new__(cls, "variable", "so2", {"angle": angle})
 
     @property
