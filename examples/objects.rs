@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout, reason = "an example prints")]
 use manifactor::geometry::{Camera, Se3, So3};
 use manifactor::prelude::*;
-use manifactor::quadric::{BoundingBox, BoundingBoxFactor, BoxModel, DualQuadric, VerticalOrientation};
+use manifactor::quadric::{BoundingBox, BoundingBoxFactor, BoxModel, DualQuadric, VerticalOrientationSmooth};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -13,12 +13,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         semi_axes: size.into(),
     };
     let bottle = quadric(0.0, [0.05, 0.05, 0.15]);
-    // cameras on an arc of 40°; their z axis points along the world's y axis
+    // cameras on an arc of 80°; their z axis points along the world's y axis
     let forward = So3::exp(&Vector3::new(-std::f64::consts::FRAC_PI_2, 0.0, 0.0));
     for orientation in [false, true] {
         let (mut graph, mut values) = (Graph::new(), Values::new());
         for i in 0..8 {
-            let angle = (f64::from(i) - 3.5) * 0.1;
+            let angle = (f64::from(i) - 3.5) * 0.2;
             let turn = So3::exp(&Vector3::new(0.0, 0.0, angle));
             let position = Vector3::new(2.0 * angle.sin(), 2.0 - 2.0 * angle.cos(), 0.3);
             let pose = Se3::new(So3::compose(&turn, &forward), position);
@@ -28,8 +28,8 @@ fn main() -> Result<(), Box<dyn Error>> {
                 model: BoxModel::Standard,
             };
             let exact = seen.predict(&pose, &bottle).ok_or("the object is behind a camera")?.bounds();
-            // a detector is wrong by a pixel or two
-            let wrong = |side: usize| 2.0 * (f64::from(i) * 7.3 + side as f64 * 2.9).sin();
+            // a detector is wrong by up to a pixel
+            let wrong = |side: usize| (f64::from(i) * 7.3 + side as f64 * 2.9).sin();
             seen.bounding_box = BoundingBox::new(std::array::from_fn(|side| exact[side] + wrong(side)))?;
             let key = Key::indexed("x", i);
             values.insert(key.clone(), pose);
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         values.insert("q0", quadric(0.4, [0.1, 0.1, 0.1]));
         if orientation {
-            graph.add(["q0"], VerticalOrientation::default()).noise(Noise::sigma(1e-3)?);
+            graph.add(["q0"], VerticalOrientationSmooth::default()).noise(Noise::sigma(0.01)?);
         }
         let solution = solve(&graph, &values, &Auto::default(), &mut Silent)?;
         let found = solution.values.get::<DualQuadric>("q0")?;
