@@ -71,9 +71,7 @@ impl Graph {
             (Err(_), Some(factor)) => {
                 let keys = self::keys("add", keys)?;
                 let factor = self::factor("factor", factor)?;
-                let entry = options.entry("add", keys, factor)?;
-                check(&entry, at)?;
-                entry
+                options.entry("add", at, keys, factor)?
             }
         };
         self.0.change("graph")?.push(entry);
@@ -156,7 +154,7 @@ impl Graph {
         let (graph, values) = (&*self.0, &*values.0);
         let cost = detach(py, || graph.cost(values))?;
         crate::raised::raise()?;
-        cost.map_err(|wrong| errors::graph(GraphError::list(&wrong).trim_start()))
+        cost.map_err(|found| files::misfit(&found))
     }
 
     /// The factor at an index, from 0. Negative indices count from the end.

@@ -2,6 +2,7 @@
 use crate::bundle::camera_model::ProjectionName;
 use crate::{Camera, CameraModel, Coordinates, Point3, Se3};
 use manifactor_graph::prelude::*;
+use nalgebra::SMatrix;
 
 /// A camera measures a point at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
 ///
@@ -70,18 +71,31 @@ impl<M: CameraModel> Residual for Projection<M> {
         _free: &[bool],
         jacobians: &mut Jacobians<Self>,
     ) -> Vector2<f64> {
-        let local = pose.inverse_act(point);
-        let seen = seen(pose, point, self.body_from_camera.as_ref());
-        let mut by_local = self.camera.derivative(&seen);
-        if let Some(mounting) = &self.body_from_camera {
-            by_local *= mounting.rotation.matrix().transpose();
-        }
-        // P = Exp(-δ)∘P: ∂P/∂(ω, v) = [P]×, -I
-        jacobians.0.fixed_columns_mut::<3>(0).copy_from(&(by_local * local.cross_matrix()));
-        jacobians.0.fixed_columns_mut::<3>(3).copy_from(&-by_local);
-        jacobians.1 = by_local * pose.rotation.matrix().transpose();
+        let mounting = self.body_from_camera.as_ref();
+        let seen = seen(pose, point, mounting);
+        *jacobians = by_pose_and_point(self.camera.derivative(&seen), pose, point, mounting);
         self.camera.project(&seen) - *self.pixel
     }
+}
+
+/// Returns the derivatives with respect to the pose and the point, from the one with respect to the point in the frame
+/// of the camera.
+#[inline]
+pub(super) fn by_pose_and_point<const ROWS: usize>(
+    by_seen: SMatrix<f64, ROWS, 3>,
+    pose: &Se3,
+    point: &Vector3<f64>,
+    mounting: Option<&Se3>,
+) -> (SMatrix<f64, ROWS, 6>, SMatrix<f64, ROWS, 3>) {
+    let by_local = match mounting {
+        Some(mounting) => by_seen * mounting.rotation.matrix().transpose(),
+        None => by_seen,
+    };
+    let mut by_pose = SMatrix::<f64, ROWS, 6>::zeros();
+    // P = Exp(-δ)∘P: ∂P/∂(ω, v) = [P]×, -I
+    by_pose.fixed_columns_mut::<3>(0).copy_from(&(by_local * pose.inverse_act(point).cross_matrix()));
+    by_pose.fixed_columns_mut::<3>(3).copy_from(&-by_local);
+    (by_pose, by_local * pose.rotation.matrix().transpose())
 }
 
 #[cfg(test)]

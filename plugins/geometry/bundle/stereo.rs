@@ -1,5 +1,5 @@
 //! Projection of a point into a rectified stereo camera.
-use super::projection::seen;
+use super::projection::{by_pose_and_point, seen};
 use crate::{Camera, CameraModel, Coordinates, Point3, Se3};
 use manifactor_graph::checked::Finite;
 use manifactor_graph::prelude::*;
@@ -65,19 +65,13 @@ impl Residual for Stereo {
         _free: &[bool],
         jacobians: &mut Jacobians<Self>,
     ) -> Vector3<f64> {
-        let local = pose.inverse_act(point);
-        let q = seen(pose, point, self.body_from_camera.as_ref());
-        let by_pixel = self.camera.derivative(&q);
-        let mut by_local = by_pixel.fixed_resize::<3, 3>(0.0);
-        by_local.set_row(2, &by_pixel.row(0));
-        by_local[(2, 2)] += self.camera.fx * self.baseline.get() / (q.z * q.z);
-        if let Some(mounting) = &self.body_from_camera {
-            by_local *= mounting.rotation.matrix().transpose();
-        }
-        // P = Exp(-δ)∘P: ∂P/∂(ω, v) = [P]×, -I
-        jacobians.0.fixed_columns_mut::<3>(0).copy_from(&(by_local * local.cross_matrix()));
-        jacobians.0.fixed_columns_mut::<3>(3).copy_from(&-by_local);
-        jacobians.1 = by_local * pose.rotation.matrix().transpose();
+        let mounting = self.body_from_camera.as_ref();
+        let q = seen(pose, point, mounting);
+        let left = self.camera.derivative(&q);
+        let mut by_seen = left.fixed_resize::<3, 3>(0.0);
+        by_seen.set_row(2, &left.row(0));
+        by_seen[(2, 2)] += self.camera.fx * self.baseline.get() / (q.z * q.z);
+        *jacobians = by_pose_and_point(by_seen, pose, point, mounting);
         self.residual::<f64>((*pose, **point))
     }
 }

@@ -28,12 +28,20 @@ impl Options<'_, '_> {
         [noise, sigma, sigmas, loss].iter().all(|given| given.is_none()) && name.is_none()
     }
 
-    /// Makes the factor. Everything that needs no values is checked.
-    pub(super) fn entry(self, what: &str, keys: Vec<Key>, factor: Arc<dyn Factor>) -> PyResult<Inner> {
+    /// Makes the factor with the index `at` of a graph. Everything that needs no values is checked.
+    pub(super) fn entry(
+        self,
+        what: &str,
+        at: usize,
+        keys: Vec<Key>,
+        factor: Arc<dyn Factor>,
+    ) -> PyResult<Inner> {
         let Self { noise, sigma, sigmas, loss, name } = self;
         let noise = noise::of_arguments(what, noise, sigma, sigmas)?;
         let loss = loss.map(|loss| self::loss("loss", loss)).transpose()?;
-        Ok(Inner { keys, name: name.map(Into::into), factor, noise, loss })
+        let entry = Inner { keys, name: name.map(Into::into), factor, noise, loss };
+        check(&entry, at)?;
+        Ok(entry)
     }
 }
 
@@ -52,9 +60,7 @@ impl FactorEntry {
     ) -> PyResult<Self> {
         let keys = self::keys("FactorEntry", keys)?;
         let factor = self::factor("factor", factor)?;
-        let entry = Options { noise, sigma, sigmas, loss, name }.entry("FactorEntry", keys, factor)?;
-        check(&entry, 0)?;
-        Ok(Self(entry))
+        Options { noise, sigma, sigmas, loss, name }.entry("FactorEntry", 0, keys, factor).map(Self)
     }
 
     /// The names of its variables, in the order of the residual's arguments.
@@ -192,9 +198,7 @@ fn between(
         relative,
         typed!(Between, relative: Se2, Se3, Point2, Point3, So2, So3, Sim3),
     )?;
-    let entry = Options { noise, sigma, sigmas, loss, name }.entry("between", keys, factor)?;
-    check(&entry, 0)?;
-    Ok(FactorEntry(entry))
+    Options { noise, sigma, sigmas, loss, name }.entry("between", 0, keys, factor).map(FactorEntry)
 }
 
 /// The variable is at `value`.
@@ -212,9 +216,7 @@ fn prior(
     let factor =
         of_value("prior", "value", value, typed!(Prior, value: Se2, Se3, Point2, Point3, So2, So3, Sim3))?;
     let keys = vec![key_of("prior", key)?];
-    let entry = Options { noise, sigma, sigmas, loss, name }.entry("prior", keys, factor)?;
-    check(&entry, 0)?;
-    Ok(FactorEntry(entry))
+    Options { noise, sigma, sigmas, loss, name }.entry("prior", 0, keys, factor).map(FactorEntry)
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

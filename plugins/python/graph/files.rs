@@ -32,8 +32,7 @@ pub(crate) fn document(
 fn document_in(py: Python<'_>, graph: &InnerGraph, values: &InnerValues, format: Format) -> PyResult<String> {
     let (found, written) = detach(py, || (graph.check(values), write_graph(graph, values, format)))?;
     let text = written.map_err(|error| errors::argument("to_document", "graph", error))?;
-    fitting(&found)?;
-    Ok(text)
+    if found.is_empty() { Ok(text) } else { Err(misfit(&found)) }
 }
 
 /// Returns a graph as a text in the format of a path's extension, and notes about what the format cannot express.
@@ -57,16 +56,12 @@ fn formatted(
         return Err(errors::argument("save", "path", message));
     };
     let (found, written) = detach(py, || (graph.check(values), writer(graph, values)))?;
-    fitting(&found)?;
-    Ok(written)
+    if found.is_empty() { Ok(written) } else { Err(misfit(&found)) }
 }
 
-/// Returns an error if there are mistakes between a graph and its values.
-fn fitting(found: &[GraphError]) -> PyResult<()> {
-    match found {
-        [] => Ok(()),
-        found => Err(errors::graph(found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))),
-    }
+/// The exception for mistakes between a graph and its values.
+pub(super) fn misfit(found: &[GraphError]) -> PyErr {
+    errors::graph(GraphError::list(found).trim_start())
 }
 
 /// Reads a graph from a file: a literal graph in TOML, JSON or YAML, or a graph in another linked format.

@@ -25,8 +25,8 @@ impl Untagged {
     }
 }
 
-/// The place of a value, for messages.
-trait Where: Sized {
+/// The location of a value among the arguments, for messages.
+trait Location: Sized {
     /// The error of a value that no document can hold.
     type Wrong: From<PyErr>;
     /// The place of the value, with a text that errors can show.
@@ -48,7 +48,7 @@ struct Argument<'a> {
     path: String,
 }
 
-impl Where for Argument<'_> {
+impl Location for Argument<'_> {
     type Wrong = PyErr;
 
     fn place(&self, text: &str) -> Place {
@@ -76,8 +76,8 @@ impl Where for Argument<'_> {
     }
 }
 
-/// A value without a place. A message about it is lost.
-struct Anywhere;
+/// No location: a message about the value is lost.
+struct NoLocation;
 
 /// Something that no document can hold.
 struct Unreadable;
@@ -88,7 +88,7 @@ impl From<PyErr> for Unreadable {
     }
 }
 
-impl Where for Anywhere {
+impl Location for NoLocation {
     type Wrong = Unreadable;
 
     fn place(&self, _text: &str) -> Place {
@@ -131,10 +131,10 @@ pub(crate) fn node(what: &str, path: &str, value: &Bound<'_, PyAny>) -> PyResult
 
 /// Converts a value to a node without places. `None` for everything that [`node`] or a reader might reject.
 pub(crate) fn plain_node(value: &Bound<'_, PyAny>) -> Option<Node> {
-    nested(&Anywhere, value, 0).ok()
+    nested(&NoLocation, value, 0).ok()
 }
 
-fn nested<W: Where>(at: &W, value: &Bound<'_, PyAny>, depth: usize) -> Result<Node, W::Wrong> {
+fn nested<W: Location>(at: &W, value: &Bound<'_, PyAny>, depth: usize) -> Result<Node, W::Wrong> {
     if depth > MAX_DEPTH {
         return Err(at.wrong(format_args!("nested more than {MAX_DEPTH} levels deep")));
     }

@@ -239,12 +239,12 @@ class Expr:
 
     def __matmul__(self, other: Any) -> Any:
         if is_matrix(other):
-            return combined(self, np.asarray(other).T)
+            return matrix_product(self, np.asarray(other).T)
         return product(self, self.trace.lift(other))
 
     def __rmatmul__(self, other: Any) -> Any:
         if is_matrix(other):
-            return combined(self, np.asarray(other))
+            return matrix_product(self, np.asarray(other))
         return product(self.trace.lift(other), self)
 
     def __lt__(self, other: Any) -> Condition:
@@ -348,7 +348,7 @@ def is_matrix(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.ndim == 2
 
 
-def combined(vector: Expr, matrix: Any) -> Any:
+def matrix_product(vector: Expr, matrix: Any) -> Any:
     """Returns the product of a constant matrix with 1 to 3 rows and a vector: a number for one row."""
     items, (rows, columns) = list(vector), matrix.shape
     if columns != len(items) or not 1 <= rows <= 3:
