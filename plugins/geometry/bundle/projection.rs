@@ -73,29 +73,28 @@ impl<M: CameraModel> Residual for Projection<M> {
     ) -> Vector2<f64> {
         let mounting = self.body_from_camera.as_ref();
         let seen = seen(pose, point, mounting);
-        *jacobians = by_pose_and_point(self.camera.derivative(&seen), pose, point, mounting);
+        derive(self.camera.derivative(&seen), (pose, point), mounting, jacobians);
         self.camera.project(&seen) - *self.pixel
     }
 }
 
-/// Returns the derivatives with respect to the pose and the point, from the one with respect to the point in the frame
+/// Writes the derivatives with respect to the pose and the point, from the one with respect to the point in the frame
 /// of the camera.
 #[inline]
-pub(super) fn by_pose_and_point<const ROWS: usize>(
-    by_seen: SMatrix<f64, ROWS, 3>,
-    pose: &Se3,
-    point: &Vector3<f64>,
+pub(super) fn derive<const ROWS: usize>(
+    mut by_local: SMatrix<f64, ROWS, 3>,
+    (pose, point): (&Se3, &Vector3<f64>),
     mounting: Option<&Se3>,
-) -> (SMatrix<f64, ROWS, 6>, SMatrix<f64, ROWS, 3>) {
-    let by_local = match mounting {
-        Some(mounting) => by_seen * mounting.rotation.matrix().transpose(),
-        None => by_seen,
-    };
-    let mut by_pose = SMatrix::<f64, ROWS, 6>::zeros();
+    (by_pose, by_point): &mut (SMatrix<f64, ROWS, 6>, SMatrix<f64, ROWS, 3>),
+) {
+    let local = pose.inverse_act(point);
+    if let Some(mounting) = mounting {
+        by_local *= mounting.rotation.matrix().transpose();
+    }
     // P = Exp(-δ)∘P: ∂P/∂(ω, v) = [P]×, -I
-    by_pose.fixed_columns_mut::<3>(0).copy_from(&(by_local * pose.inverse_act(point).cross_matrix()));
+    by_pose.fixed_columns_mut::<3>(0).copy_from(&(by_local * local.cross_matrix()));
     by_pose.fixed_columns_mut::<3>(3).copy_from(&-by_local);
-    (by_pose, by_local * pose.rotation.matrix().transpose())
+    *by_point = by_local * pose.rotation.matrix().transpose();
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
 //! Projection of a point into a rectified stereo camera.
-use super::projection::{by_pose_and_point, seen};
+use super::projection::{derive, seen};
 use crate::{Camera, CameraModel, Coordinates, Point3, Se3};
 use manifactor_graph::checked::Finite;
 use manifactor_graph::prelude::*;
@@ -71,7 +71,7 @@ impl Residual for Stereo {
         let mut by_seen = left.fixed_resize::<3, 3>(0.0);
         by_seen.set_row(2, &left.row(0));
         by_seen[(2, 2)] += self.camera.fx * self.baseline.get() / (q.z * q.z);
-        *jacobians = by_pose_and_point(by_seen, pose, point, mounting);
+        derive(by_seen, (pose, point), mounting, jacobians);
         self.residual::<f64>((*pose, **point))
     }
 }
