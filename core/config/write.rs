@@ -16,9 +16,9 @@ pub enum WriteError {
         /// The number.
         value: f64,
     },
-    /// A graph with a held variable that has no value.
-    #[error("the graph holds `{key}` fixed, but there is no value for it")]
-    FixedWithoutValue {
+    /// A graph with a fixed or bounded variable that has no value.
+    #[error("the graph fixes or bounds `{key}`, but there is no value for it")]
+    MissingValue {
         /// The variable.
         key: Key,
     },

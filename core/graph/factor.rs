@@ -7,7 +7,7 @@ mod unnamed;
 
 use crate::algebra::{Dimension, Direction};
 use crate::factor::batch::{Batch, BatchOf};
-use crate::loss::Loss;
+use crate::loss::{Constraint, Loss};
 use crate::noise::{Noise, Whitener};
 use crate::registry::catalogue::Signature;
 use crate::residual::Residual;
@@ -80,6 +80,14 @@ impl FactorEntry {
     pub fn noise(&mut self, noise: Noise) -> &mut Self {
         self.noise = noise;
         self
+    }
+    /// Makes the factor an equality constraint: see [`Constraint`].
+    pub fn constraint(&mut self) -> &mut Self {
+        self.loss(Constraint {})
+    }
+    /// Returns whether the factor is an equality constraint.
+    pub fn is_constraint(&self) -> bool {
+        self.loss.as_ref().is_some_and(|loss| loss.erased().as_any().is::<Constraint>())
     }
     /// Sets the loss.
     pub fn loss(&mut self, loss: impl Loss + 'static) -> &mut Self {

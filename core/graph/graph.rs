@@ -1,4 +1,5 @@
 //! The dynamic view of a graph, for building, editing, reading and writing.
+mod bounds;
 mod version;
 
 use crate::factor::{Factor, FactorEntry};
@@ -17,15 +18,18 @@ use std::any::TypeId;
 use std::fmt;
 use std::sync::Arc;
 
+pub use bounds::{Bounds, Interval, IntervalError, OutOfBounds};
 pub use version::Version;
 
-/// Factors between named variables, and the set of fixed variables.
+/// Factors between named variables, the fixed variables, and the bounds of variables.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Graph {
     factors: Vec<FactorEntry>,
     #[serde(skip_serializing_if = "IndexMap::is_empty")]
     fixed: IndexMap<Key, Fixed>,
+    #[serde(skip_serializing_if = "IndexMap::is_empty")]
+    bounds: IndexMap<Key, Bounds>,
     /// Renewed by every method that gives mutable access to the content.
     #[serde(skip)]
     version: Version,
@@ -172,6 +176,28 @@ pub enum GraphError {
         /// The directions of the variable.
         tangent: &'static [&'static str],
     },
+    /// Bounds of a variable that does not exist.
+    #[error("`{key}` is to have bounds, but there is no such variable")]
+    MissingBounded {
+        /// The key.
+        key: Key,
+    },
+    /// Bounds of a direction along which steps do not add to a coordinate.
+    #[error(
+        "`{key}` ({found}) cannot have bounds along `{direction}`: bounds are for coordinates to which steps add, such as \
+         those of a point3"
+    )]
+    Unboundable {
+        /// The key.
+        key: Key,
+        /// The requested direction.
+        direction: String,
+        /// The type of the variable.
+        found: &'static str,
+    },
+    /// An initial value that is out of its bounds.
+    #[error(transparent)]
+    OutOfBounds(OutOfBounds),
     /// A value with a coordinate that is not finite.
     #[error("the value of `{key}` is not finite")]
     NotFinite {
@@ -251,6 +277,66 @@ impl Graph {
     pub fn fixed(&self) -> &IndexMap<Key, Fixed> {
         &self.fixed
     }
+    /// Bounds a coordinate of a variable, by the name of its direction:
+    /// `graph.bound("camera", "f", Interval::new(400.0..=600.0)?)`. Steps stop at the bounds.
+    pub fn bound(&mut self, key: impl Into<Key>, direction: impl Into<String>, interval: Interval) {
+        self.version = Version::default();
+        self.bounds.entry(key.into()).or_default().insert(direction, interval);
+    }
+    /// Sets all bounds of a variable.
+    pub fn set_bounds(&mut self, key: impl Into<Key>, bounds: Bounds) {
+        self.version = Version::default();
+        match bounds.is_empty() {
+            true => self.bounds.shift_remove(&key.into()),
+            false => self.bounds.insert(key.into(), bounds),
+        };
+    }
+    /// Returns the bounds of variables.
+    pub fn bounds(&self) -> &IndexMap<Key, Bounds> {
+        &self.bounds
+    }
+    /// Adds the factors of another graph, its fixed variables and its bounds.
+    pub fn extend(&mut self, other: &Self) {
+        self.factors_mut().extend(other.factors.iter().cloned());
+        self.hold_all_like(other);
+    }
+    /// Fixes and bounds a variable as another graph does.
+    pub fn hold_like(&mut self, other: &Self, key: &Key) {
+        if let Some(fixed) = other.fixed.get(key) {
+            self.set_fixed(key.clone(), fixed.clone());
+        }
+        if let Some(bounds) = other.bounds.get(key) {
+            self.set_bounds(key.clone(), bounds.clone());
+        }
+    }
+    /// Fixes and bounds variables as another graph does.
+    pub fn hold_all_like(&mut self, other: &Self) {
+        other.fixed.keys().chain(other.bounds.keys()).for_each(|key| self.hold_like(other, key));
+    }
+    /// Returns the first coordinate that is out of its bounds.
+    pub fn out_of_bounds(&self, values: &Values) -> Option<OutOfBounds> {
+        self.bounds
+            .iter()
+            .find_map(|(key, bounds)| bounds.out_of_bounds(key, values.variable(key.as_str())?).next())
+    }
+    /// Returns the values with the coordinates that are out of bounds moved to them.
+    #[must_use]
+    pub fn within_bounds(&self, mut values: Values) -> Values {
+        // a long step to a narrow interval may miss it by rounding, and a second one does not
+        for (key, bounds) in self.bounds.iter().chain(&self.bounds) {
+            let Some(value) = values.variable(key.as_str()) else { continue };
+            let mut step = vec![0.0; value.erased().dim()];
+            for (direction, interval, x) in bounds.of(value) {
+                step[direction] = interval.clip(x, 0.0);
+            }
+            if step.iter().any(|x| *x != 0.0)
+                && let Some(moved) = value.erased().retract(&step)
+            {
+                values.insert_boxed(key.clone(), moved);
+            }
+        }
+        values
+    }
     /// Returns the version, which changes with the graph: see [`Version`].
     pub fn version(&self) -> Version {
         self.version
@@ -261,7 +347,8 @@ impl Graph {
         self.resolve(values).err().unwrap_or_default()
     }
 
-    /// Returns the cost ½ Σ ρ(‖r‖²) at `values`. Factors that are undefined there do not count.
+    /// Returns the cost ½ Σ ρ(‖r‖²) at `values`. Factors that are undefined there do not count, and neither do
+    /// constraints.
     ///
     /// # Errors
     /// All errors between this graph and `values`.
@@ -273,7 +360,7 @@ impl Graph {
             let squared = entry.squared_at(&points)?;
             Some(0.5 * entry.loss.as_ref().map_or(squared, |loss| loss.erased().rho(squared).0))
         };
-        Ok(self.factors.iter().filter_map(cost).sum())
+        Ok(self.factors.iter().filter(|entry| !entry.is_constraint()).filter_map(cost).sum())
     }
 
     /// Looks up the variables of every factor, and checks that all of them fit.
@@ -293,6 +380,12 @@ impl Graph {
                 continue;
             };
             fixed.check(key, value.erased().tangent(), &mut errors);
+        }
+        for (key, bounds) in &self.bounds {
+            match values.variable(key.as_str()) {
+                Some(value) => bounds.check(key, value, &mut errors),
+                None => errors.push(GraphError::MissingBounded { key: key.clone() }),
+            }
         }
         let bad = values.iter().filter(|(_, v)| !v.erased().is_finite());
         errors.extend(bad.map(|(key, _)| GraphError::NotFinite { key: key.clone() }));

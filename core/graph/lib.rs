@@ -22,7 +22,10 @@ pub use algebra::{
 };
 pub use factor::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows, batch, invariance};
 pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, Unnamed, signature};
-pub use graph::{Fixed, Graph, GraphError, Resolved, VariableIndices, Version};
+pub use graph::{
+    Bounds, Fixed, Graph, GraphError, Interval, IntervalError, OutOfBounds, Resolved, VariableIndices,
+    Version,
+};
 pub use manifactor_document::TextError;
 pub use noise::Noise;
 pub use registry::{TypeName, UnknownType, catalogue, checked};

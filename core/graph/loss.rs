@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 mod kernels;
 mod tempered;
-pub use kernels::{Cauchy, Dcs, Fair, GemanMcClure, Huber, L1, L2, Tukey, Welsch};
+pub use kernels::{Cauchy, Constraint, Dcs, Fair, GemanMcClure, Huber, L1, L2, Tukey, Welsch};
 pub use tempered::Tempered;
 
 /// The trait for authors: ρ and its derivative. Register a loss with

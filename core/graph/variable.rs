@@ -74,6 +74,8 @@ pub trait ErasedManifold {
     fn retract(&self, delta: &[f64]) -> Option<Box<dyn Variable>>;
     /// Returns the tangent vector to `other`; `None` if that has a different type.
     fn local(&self, other: &dyn Variable) -> Option<Vec<f64>>;
+    /// See [`Manifold::coordinate`].
+    fn coordinate(&self, direction: usize) -> Option<f64>;
     /// Returns whether every coordinate is finite.
     fn is_finite(&self) -> bool;
     /// Returns a copy of the point.
@@ -102,6 +104,9 @@ impl<M: Manifold + Variable> ErasedManifold for M {
     fn local(&self, other: &dyn Variable) -> Option<Vec<f64>> {
         let other = other.erased().as_any().downcast_ref::<M>()?;
         Some(Manifold::local(self, other).as_ref().to_vec())
+    }
+    fn coordinate(&self, direction: usize) -> Option<f64> {
+        Manifold::coordinate(self, direction)
     }
     fn is_finite(&self) -> bool {
         Manifold::is_finite(self)

@@ -34,6 +34,20 @@ pub enum ChangeError {
         /// The id of the call.
         factor: FactorId,
     },
+    /// Bounds, which only solvers of whole graphs have.
+    #[error("`{key}` has bounds, and the smoother has none: leave them out, or solve the whole graph")]
+    Bounded {
+        /// The first bounded variable.
+        key: Key,
+    },
+    /// An equality constraint, which only solvers of whole graphs have.
+    #[error(
+        "factor {factor} is a constraint, and the smoother has none: solve the whole graph, or take a small noise"
+    )]
+    Constraint {
+        /// Its index in the list that was pushed, from 0.
+        factor: usize,
+    },
     /// A variable that has to keep its linearization point because it is part of a linear prior.
     #[error(
         "`{key}` cannot be held, freed or moved: it is part of a linear prior, and keeps its linearization point"

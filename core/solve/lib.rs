@@ -19,9 +19,10 @@ pub use linear::settings::{ConjugateGradients, LinearSolver, Method, Ordering, P
 pub use linear::{BlockSystem, BlockSystemError};
 pub use observer::{AllObservers, Interrupt, Observer, Silent};
 pub use outcome::{
-    InactiveFactor, IterationRecord, LargestMoves, Outcome, RejectedFactor, Times, UnconstrainedVariables,
+    ActiveBound, ConstraintState, InactiveFactor, IterationRecord, LargestMoves, Outcome, RejectedFactor,
+    Times, UnconstrainedVariables,
 };
-pub use outcome::{Stall, Termination, Tolerance, Undetermined};
+pub use outcome::{Side, Stall, Termination, Tolerance, Undetermined};
 pub use problem::{CompileError, Problem, ProblemChangeError, WeightError};
 pub use strategy::{
     Auto, Candidates, Descent, DiagonalLimits, Dogleg, GaussNewton, GivenStart, Gnc, Growth,
@@ -37,7 +38,8 @@ pub mod front {
 }
 
 use manifactor_graph::batch::FactorState;
-use manifactor_graph::{Graph, Values};
+use manifactor_graph::{FactorEntry, Graph, Values};
+use strategy::multipliers;
 
 /// An estimate, and the outcome of its solve.
 #[derive(Debug, Clone)]
@@ -51,11 +53,13 @@ pub struct Solution {
     /// Weight of each factor by the solver, on top of its loss; empty if the solver does not weight
     /// factors.
     pub weights: Vec<f64>,
+    /// The constraints with their multipliers.
+    constraints: problem::Constraints,
     /// The solved problem, for queries about the estimate.
     problem: problem::SharedProblem,
 }
 
-/// Compiles and solves a graph.
+/// Compiles and solves a graph, subject to its constraints.
 ///
 /// # Errors
 /// If graph and values do not fit each other. Numerical trouble is not an error: see
@@ -66,7 +70,10 @@ pub fn solve(
     optimizer: &dyn Optimizer,
     observer: &mut dyn Observer,
 ) -> Result<Solution, CompileError> {
-    let solution = optimizer.solve(graph, values, observer)?;
+    let solution = match graph.factors().iter().any(FactorEntry::is_constraint) {
+        true => multipliers::solve(graph, values, optimizer, observer)?,
+        false => optimizer.solve(graph, values, observer)?,
+    };
     let Outcome { termination, iterations, initial_cost, final_cost, times, .. } = &solution.outcome;
     let (solver, seconds) = (optimizer.typetag_name(), times.total);
     tracing::info!(solver, iterations, initial_cost, final_cost, seconds, "{termination}");
@@ -77,6 +84,8 @@ impl Solution {
     /// Takes estimate, factors and weights from a problem at the end of a solve.
     fn of(problem: Problem, outcome: Outcome) -> Self {
         let (values, factors, weights) = (problem.values(), problem.inspect(), problem.weights().to_vec());
-        Self { values, outcome, factors, weights, problem: problem::SharedProblem::new(problem) }
+        let constraints = problem.constraints.clone();
+        let problem = problem::SharedProblem::new(problem);
+        Self { values, outcome, factors, weights, constraints, problem }
     }
 }

@@ -1,4 +1,6 @@
 //! The outcome of a solve.
+mod active_bound;
+mod constraint_state;
 mod moving;
 mod termination;
 mod unconstrained;
@@ -7,6 +9,8 @@ use manifactor_graph::Key;
 use serde::Serialize;
 use std::borrow::Cow;
 
+pub use active_bound::{ActiveBound, Side};
+pub use constraint_state::ConstraintState;
 pub use moving::LargestMoves;
 pub use termination::{Stall, Termination, Tolerance, Undetermined};
 pub use unconstrained::{InactiveFactor, UnconstrainedVariables};
@@ -28,6 +32,12 @@ pub struct Outcome {
     /// The variables that the last step moved most, if the solve ran out of iterations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub moving: Option<LargestMoves>,
+    /// The bounds that hold the estimate.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub active_bounds: Vec<ActiveBound>,
+    /// The equality constraints. The costs are those of the other factors.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub constraints: Vec<ConstraintState>,
     /// Free variables without an active factor. A solve with such variables is never converged.
     #[serde(rename = "untouched", skip_serializing_if = "Option::is_none")]
     pub unconstrained: Option<UnconstrainedVariables>,

@@ -1,6 +1,8 @@
 //! A compiled graph: a model of variables and factors, and the linear system of its steps.
+mod bounds;
 mod change;
 mod compile;
+mod constraints;
 mod estimate;
 mod method;
 mod model;
@@ -16,8 +18,9 @@ use std::time::Instant;
 
 pub use change::ProblemChangeError;
 pub use compile::CompileError;
+pub(crate) use constraints::{Constraints, TOLERANCE as CONSTRAINT_TOLERANCE};
 pub use estimate::WeightError;
-pub(crate) use model::{Model, ProblemFactor};
+pub(crate) use model::{Model, ProblemFactor, ProblemVariable};
 pub(crate) use shared::SharedProblem;
 
 /// A compiled graph. The structure lives as long as the problem, and all its solves reuse it.
@@ -27,6 +30,8 @@ pub struct Problem {
     pub(crate) times: Times,
     /// Version of the compiled graph; renewed when a measurement is changed in the problem.
     version: Version,
+    bounds: bounds::BoundedUnknowns,
+    pub(crate) constraints: Constraints,
     /// Revision of the model at which H and g were computed.
     linearized: Option<u64>,
     /// Revision of the model at which the factor of H showed no undetermined direction.
@@ -52,7 +57,8 @@ impl Problem {
     }
 
     fn new(model: Model, system: LinearSystem, version: Version, times: Times) -> Self {
-        Self { model, system, times, version, linearized: None, determined: None }
+        let (bounds, constraints) = (bounds::BoundedUnknowns::default(), Constraints::default());
+        Self { model, system, times, version, bounds, constraints, linearized: None, determined: None }
     }
 
     /// Returns the estimate, in the order of the values at compilation.
@@ -82,6 +88,7 @@ impl Problem {
         let clock = Instant::now();
         let mut total = self.model.linearize(&mut self.system.begin());
         self.system.finish();
+        self.hold_active();
         self.linearized = Some(self.model.revision());
         if !total.cost.is_finite() || !self.system.is_finite() {
             total.not_finite = total.not_finite.or_else(|| Some(self.model.not_finite_factor()));
@@ -106,7 +113,7 @@ impl Problem {
     }
 
     /// Returns H = JᵀJ (lower triangle, compressed columns, in elimination order) and g = Jᵀr, as of the
-    /// last linearization.
+    /// last linearization. Unknowns that are fixed or held at a bound have one on the diagonal of H and zero elsewhere.
     pub fn normal_equations(&self) -> (&[usize], &[u32], &[f64], &[f64]) {
         let LinearSystem { layout, h, g, .. } = &self.system;
         (&layout.col_ptr, &layout.row_idx, h, g)
@@ -143,10 +150,11 @@ impl Problem {
         self.times
     }
 
-    /// Sets the trial to `estimate ⊞ step`, and returns its cost.
+    /// Sets the trial to `estimate ⊞ step`, within the bounds, and returns its cost.
     pub(crate) fn try_step(&mut self, step: &[f64]) -> Evaluation {
         let clock = Instant::now();
-        let cost = self.model.try_step(step);
+        self.retract(step);
+        let cost = self.model.trial_cost();
         self.times.evaluate += clock.elapsed().as_secs_f64();
         cost
     }

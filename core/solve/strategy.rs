@@ -5,6 +5,7 @@ mod dogleg;
 mod gauss_newton;
 mod gnc;
 mod levenberg_marquardt;
+pub(crate) mod multipliers;
 mod optimizer;
 mod start;
 

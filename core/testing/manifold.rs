@@ -16,8 +16,8 @@ const SEED_TOLERANCE: f64 = 1e-6;
 /// Checks the laws of a manifold at two points, and for a tangent vector `delta` at the first. `delta` has to
 /// be inside of the chart (for rotations: shorter than π).
 ///
-/// The laws are `x ⊞ 0 = x`; `x ⊞ (y ⊟ x) = y`; `(x ⊞ δ) ⊟ x = δ`; all results are finite; each direction has
-/// a name; a document of x reads back as an equal document; [`seed_law`].
+/// The laws are `x ⊞ 0 = x`; `x ⊞ (y ⊟ x) = y`; `(x ⊞ δ) ⊟ x = δ`; all results are finite; steps add to
+/// coordinates; each direction has a name; a document of x reads back as an equal document; [`seed_law`].
 ///
 /// # Errors
 /// The first law that does not hold.
@@ -58,6 +58,12 @@ pub fn manifold_laws(x: &dyn Variable, y: &dyn Variable, delta: &[f64]) -> Resul
     let back = from.local(&*moved).ok_or_else(wrong(law))?;
     let difference: Vec<f64> = back.iter().zip(delta).map(|(b, d)| b - d).collect();
     small(law, Some(norm(&difference)))?;
+
+    let law = "x.retract(delta) adds to coordinates";
+    for (direction, step) in delta.iter().enumerate() {
+        let sum = from.coordinate(direction).map(|x| x + step);
+        require(moved.erased().coordinate(direction) == sum, law)?;
+    }
 
     let law = "a document reads back as the same document";
     for variable in [x, &*moved] {

@@ -4,7 +4,7 @@ mod svg;
 
 use crate::failure::Failure;
 use crate::output::text::Table;
-use manifactor::graph::{Fixed, Graph, Values};
+use manifactor::graph::{Bounds, Fixed, Graph, Values};
 use manifactor::solve::Problem;
 use serde::Serialize;
 use serde_json::Value;
@@ -27,6 +27,8 @@ pub(crate) struct VariableRow {
     pub of_type: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fixed: Option<Fixed>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bounds: Option<Bounds>,
     pub before: Value,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after: Option<Value>,
@@ -85,6 +87,7 @@ impl Inspection {
             key: key.to_string(),
             of_type: value.typetag_name(),
             fixed: graph.fixed().get(key).cloned(),
+            bounds: graph.bounds().get(key).cloned(),
             before: json(value),
             after: estimate.and_then(|values| values.variable(key.as_str())).map(json),
         });

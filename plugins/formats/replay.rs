@@ -72,7 +72,7 @@ impl GraphReplay {
             best_first(factors, initial);
         }
         let mut fixed = Graph::new();
-        graph.fixed().iter().for_each(|(key, held)| fixed.set_fixed(key, held.clone()));
+        fixed.hold_all_like(graph);
         Self {
             steps: steps.into_values().collect(),
             waiting: WaitingFactors::default(),
@@ -128,9 +128,7 @@ impl GraphReplay {
         }
         let placed = spanning_tree(&graph, &values, Tree::Chain)?;
         for key in keys {
-            if let Some(held) = self.fixed.fixed().get(&key) {
-                graph.set_fixed(&key, held.clone());
-            }
+            graph.hold_like(&self.fixed, &key);
             if let Some(value) = placed.variable(key.as_str()).or_else(|| self.initial.variable(key.as_str()))
             {
                 step.values.insert_boxed(key, value.erased().clone_box());

@@ -11,7 +11,9 @@ use crate::input::{Columns, key_of, key_rows, keys};
 use crate::threads::detach;
 use entry::Options;
 use manifactor::graph::catalogue::find;
-use manifactor::graph::{Factor, FactorEntry as Entry, Fixed, Graph as Inner, GraphError, Key};
+use manifactor::graph::{
+    Bounds, Factor, FactorEntry as Entry, Fixed, Graph as Inner, GraphError, Interval, Key,
+};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyBytes, PyDict, PyMappingProxy};
 use std::collections::BTreeMap;
@@ -143,6 +145,44 @@ impl Graph {
         Ok(PyMappingProxy::new(py, dict.as_mapping()))
     }
 
+    /// Bounds a coordinate of a variable, which steps do not cross: `graph.bound("scale", "x", min=0.5)`.
+    /// Coordinates are those to which steps add, such as those of a point or the focal length of a camera.
+    #[pyo3(signature = (key, direction, *, min = None, max = None))]
+    fn bound(
+        &mut self,
+        key: &Bound<'_, PyAny>,
+        direction: String,
+        min: Option<f64>,
+        max: Option<f64>,
+    ) -> PyResult<()> {
+        let key = key_of("bound", key)?;
+        let range = min.unwrap_or(f64::NEG_INFINITY)..=max.unwrap_or(f64::INFINITY);
+        let interval = Interval::new(range).map_err(|error| errors::argument("bound", "", error))?;
+        self.0.change("graph")?.bound(key, direction, interval);
+        Ok(())
+    }
+
+    /// Removes the bounds of a variable.
+    fn unbound(&mut self, key: &Bound<'_, PyAny>) -> PyResult<()> {
+        let key = key_of("unbound", key)?;
+        self.0.change("graph")?.set_bounds(key, Bounds::default());
+        Ok(())
+    }
+
+    /// The bounds by key: for each bounded direction `(min, max)`, infinite on a side without a limit.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let dict = PyDict::new(py);
+        for (key, bounds) in self.0.bounds() {
+            let of_key = PyDict::new(py);
+            for (direction, interval) in bounds.iter() {
+                of_key.set_item(direction, (interval.min(), interval.max()))?;
+            }
+            dict.set_item(key.as_str(), of_key)?;
+        }
+        Ok(PyMappingProxy::new(py, dict.as_mapping()))
+    }
+
     /// Returns all errors of the graph with these values; empty if it can be solved.
     fn check(&self, py: Python<'_>, values: PyRef<'_, Values>) -> PyResult<Vec<String>> {
         let (graph, values) = (&*self.0, &*values.0);
@@ -181,12 +221,12 @@ impl Graph {
         self.0.factors().len()
     }
 
-    /// Returns a graph with the factors and fixed variables of both.
+    /// Returns a graph with the factors, fixed variables and bounds of both.
     fn __add__(&self, other: PyRef<'_, Self>) -> Self {
         let mut sum = self.0.copy();
         // a copy can be changed
         if let Ok(graph) = sum.change("graph") {
-            extend(graph, &other.0);
+            graph.extend(&other.0);
         }
         Self(sum)
     }
@@ -194,7 +234,7 @@ impl Graph {
     fn __iadd__(slf: &Bound<'_, Self>, other: &Bound<'_, Self>) -> PyResult<()> {
         // both may be one object
         let other = other.borrow().0.snapshot();
-        extend(slf.borrow_mut().0.change("graph")?, &other);
+        slf.borrow_mut().0.change("graph")?.extend(&other);
         Ok(())
     }
 
@@ -240,11 +280,6 @@ impl Graph {
         }
         types
     }
-}
-
-fn extend(graph: &mut Inner, other: &Inner) {
-    graph.factors_mut().extend(other.factors().iter().cloned());
-    other.fixed().iter().for_each(|(key, fixed)| graph.set_fixed(key.clone(), fixed.clone()));
 }
 
 /// A class, its arguments, and a state, from which `pickle` creates an object.

@@ -105,7 +105,7 @@ fn solve(
     let mut watch = Watch::new(observer);
     let (graph, values) = (graph.0.snapshot(), values.0.snapshot());
     let solved = detach(py, || {
-        let values = start.start(&graph, &values).map_err(|error| error.to_string())?;
+        let values = start.initial_values(&graph, &values).map_err(|error| error.to_string())?;
         solve_inner(&graph, &values, &*solver, &mut watch).map_err(|error| error.to_string())
     })?;
     watch.finish()?;

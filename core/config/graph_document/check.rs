@@ -1,7 +1,7 @@
 //! Errors between the factors and the variables of a document, with positions.
 use super::read::Read;
 use manifactor_document::{Diagnostic, Errors, Fault, Node, Place, Value, nearest, quoted_list};
-use manifactor_graph::{GraphError, Key};
+use manifactor_graph::{GraphError, Key, OutOfBounds};
 
 /// Largest number of variables that are listed for an unknown key.
 const MAX_LISTED: usize = 12;
@@ -54,6 +54,7 @@ fn place(read: &Read<'_>, error: &GraphError, root: &Place) -> Option<Diagnostic
     let at_key = |of: &usize, position: usize| at(factor(of).and_then(|f| f.items("keys").get(position)));
     let variable = |key: &Key| read.variables.get(key);
     let at_variable = |key: &Key| at(variable(key).and_then(|variable| variable.field("key")));
+    let bound = |key: &Key, direction: &str| variable(key)?.field("bounds")?.field(direction);
     Some(match error {
         GraphError::MissingVariable { .. } => return None,
         GraphError::WrongArity { factor: of, name, expected, found } => {
@@ -84,10 +85,17 @@ fn place(read: &Read<'_>, error: &GraphError, root: &Place) -> Option<Diagnostic
         GraphError::UnknownDirection { key, direction, tangent } => {
             let names = variable(key).map(|variable| variable.items("fixed")).unwrap_or_default();
             let is_it = |node: &&Node| matches!(&node.value, Value::String(name) if name == direction);
-            let place = names.iter().find(is_it).map(|node| node.place.clone());
+            let place =
+                names.iter().find(is_it).or_else(|| bound(key, direction)).map(|node| node.place.clone());
             let known = tangent.iter().map(|name| (*name).to_owned()).collect();
             let problem = Fault::UnknownName { what: "direction".into(), name: direction.clone(), known };
             Diagnostic::new(place.unwrap_or_else(|| at_variable(key)), problem)
+        }
+        GraphError::Unboundable { key, direction, .. } => {
+            Diagnostic::new(at(bound(key, direction)), Fault::invalid(error.to_string()))
+        }
+        GraphError::OutOfBounds(OutOfBounds { key, direction, .. }) => {
+            Diagnostic::new(at(bound(key, direction)), Fault::invalid(error.to_string()))
         }
         GraphError::MissingFixed { key } | GraphError::NotFinite { key } => {
             Diagnostic::new(at_variable(key), Fault::invalid(error.to_string()))

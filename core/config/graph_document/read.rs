@@ -5,7 +5,7 @@ use crate::document::Document;
 use indexmap::IndexMap;
 use manifactor_document::{Diagnostic, Diagnostics, Errors, Fault, Node, Section, Value};
 use manifactor_graph::loss::Loss;
-use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Noise, Values, Variable};
+use manifactor_graph::{Bounds, Factor, FactorEntry, Fixed, Graph, Key, Noise, Values, Variable};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::borrow::Cow;
@@ -22,6 +22,11 @@ use std::sync::Arc;
 /// [[variables]]
 /// key = "x1"
 /// value = { type = "se2", translation = [1.0, 0.0], angle = 0.1 }
+///
+/// [[variables]]
+/// key = "scale"
+/// value = { type = "point1", position = [1.0] }
+/// bounds = { x = { min = 0.5, max = 2.0 } }      # limits of coordinates, which steps do not cross
 ///
 /// [[factors]]
 /// keys = ["x0", "x1"]
@@ -75,6 +80,9 @@ pub(crate) struct VariableDocument {
     /// Directions that are held at the initial value, or `true` for all of them.
     #[serde(default)]
     fixed: Fixed,
+    /// Limits of coordinates, by the names of their directions. Default: none.
+    #[serde(default)]
+    bounds: Bounds,
 }
 
 /// A factor in a document.
@@ -136,6 +144,7 @@ impl<'a> Read<'a> {
         if let Some(variable) = read {
             self.values.insert_boxed(key.clone(), variable.value);
             self.graph.set_fixed(key.clone(), variable.fixed);
+            self.graph.set_bounds(key.clone(), variable.bounds);
         }
         self.variables.insert(key, node);
     }

@@ -2,7 +2,7 @@
 use crate::format::Format;
 use crate::write::{WriteError, tree};
 use ::toml::Value;
-use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Values, Variable};
+use manifactor_graph::{Bounds, FactorEntry, Fixed, Graph, Key, Values, Variable};
 use serde::Serialize;
 
 #[derive(Serialize)]
@@ -17,19 +17,26 @@ struct LiteralVariable<'a> {
     value: &'a dyn Variable,
     #[serde(skip_serializing_if = "Option::is_none")]
     fixed: Option<&'a Fixed>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bounds: Option<&'a Bounds>,
 }
 
 /// Writes a graph and its values as a document. [`read_graph`](crate::read_graph) restores it bit for bit.
 ///
 /// # Errors
-/// If a held variable has no value, or a value is not finite.
+/// If a fixed or bounded variable has no value, or a value is not finite.
 pub fn write_graph(graph: &Graph, values: &Values, format: Format) -> Result<String, WriteError> {
-    if let Some(key) = graph.fixed().keys().find(|key| !values.contains(key.as_str())) {
-        return Err(WriteError::FixedWithoutValue { key: key.clone() });
+    if let Some(key) =
+        graph.fixed().keys().chain(graph.bounds().keys()).find(|key| !values.contains(key.as_str()))
+    {
+        return Err(WriteError::MissingValue { key: key.clone() });
     }
     let variables = values
         .iter()
-        .map(|(key, value)| LiteralVariable { key, value, fixed: graph.fixed().get(key) })
+        .map(|(key, value)| {
+            let (fixed, bounds) = (graph.fixed().get(key), graph.bounds().get(key));
+            LiteralVariable { key, value, fixed, bounds }
+        })
         .collect();
     let literal = Literal { variables, factors: graph.factors() };
     match format {

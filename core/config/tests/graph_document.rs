@@ -177,11 +177,10 @@ factor = { type = "offset", measured = [0.5, 1] }
 
 [solver]
 "#;
-    let losses =
-        "`cauchy`, `dcs`, `fair`, `geman_mcclure`, `huber`, `l1`, `l2`, `tempered`, `tukey` and `welsch`";
+    let losses = "`cauchy`, `constraint`, `dcs`, `fair`, `geman_mcclure`, `huber`, `l1`, `l2`, `tempered`, `tukey` and `welsch`";
     let expected = format!(
         "graph:4:18: unknown variable `plan` (did you mean `plane`? there are `plane` and `real`)\n\
-         graph:5:1: unknown field `fixd` (did you mean `fixed`? there are `key`, `value` and `fixed`)\n\
+         graph:5:1: unknown field `fixd` (did you mean `fixed`? there are `key`, `value`, `fixed` and `bounds`)\n\
          graph:9:31: expected a number, found the text \"0.5\"\n\
          graph:13:31: `nan` is not a finite number\n\
          graph:18:15: unknown direction `z` (there are `x` and `y`)\n\
@@ -300,7 +299,7 @@ fn a_variable_held_without_a_value_is_not_written() {
     let mut graph = Graph::new();
     graph.fix("x7");
     let error = write_graph(&graph, &Values::new(), Format::Json).unwrap_err();
-    assert_eq!(error.to_string(), "the graph holds `x7` fixed, but there is no value for it");
+    assert_eq!(error.to_string(), "the graph fixes or bounds `x7`, but there is no value for it");
 }
 
 #[test]

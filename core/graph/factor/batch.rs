@@ -1,4 +1,5 @@
 //! Batches: factors of one concrete type, stored contiguously.
+mod augmentation;
 mod batches;
 mod change;
 mod pass;
@@ -10,6 +11,7 @@ use crate::loss::{Loss, LossColumn};
 use crate::noise::{Whitener, Whiteners};
 use crate::residual::normal_equations::{NormalEquations, Slot};
 use crate::variable::column::{Columns, FIXED};
+use augmentation::Augmentation;
 use pass::{CHUNK, COST_SHARE, Work};
 use pulp::Arch;
 use std::any::Any;
@@ -127,6 +129,9 @@ pub trait Batch: Send + Sync {
     fn costs(&self, columns: &Columns, to: &mut [f64]);
     /// Sets the weight of each factor, by index in the graph. It multiplies the weight of the loss.
     fn set_weights(&mut self, weights: &[f64]);
+    /// Replaces the whitened residual r of factor `index` of the batch by `scale * r + shift`. The state of the
+    /// factor and its residual in reports stay.
+    fn augment(&mut self, index: usize, scale: f64, shift: &[f64]);
     /// Returns the state of each factor, in the order of the batch.
     fn inspect(&self, columns: &Columns) -> Vec<FactorState>;
     /// Visits the Jacobian rows of each defined factor.
@@ -174,6 +179,8 @@ pub(crate) struct BatchOf<F: Kernel> {
     losses: Option<Box<dyn LossColumn>>,
     /// Weight of each factor, which multiplies its cost; empty if no weights were set.
     weights: Vec<f64>,
+    /// Scale and shift of each residual; empty if none was set.
+    augmentations: Vec<Augmentation<F::Dim>>,
     active: Vec<bool>,
     /// One entry per chunk of the current window and of the next one, for threads. Empty until first used.
     work: [Vec<Work<F>>; 2],
@@ -199,6 +206,7 @@ impl<F: Kernel> BatchOf<F> {
             whiteners: Whiteners::like(noise),
             losses: loss.map(|l| l.erased().column()),
             weights: vec![],
+            augmentations: vec![],
             active: vec![],
             work: [vec![], vec![]],
             alone: 0.0,
@@ -260,6 +268,9 @@ impl<F: Kernel> Batch for BatchOf<F> {
         }
         if !self.weights.is_empty() {
             self.weights.push(1.0);
+        }
+        if !self.augmentations.is_empty() {
+            self.augmentations.push(Augmentation::none());
         }
         self.active.push(true);
     }
@@ -323,6 +334,11 @@ impl<F: Kernel> Batch for BatchOf<F> {
     fn set_weights(&mut self, weights: &[f64]) {
         self.weights.clear();
         self.weights.extend(self.entries.iter().map(|entry| weights[*entry as usize]));
+    }
+
+    fn augment(&mut self, index: usize, scale: f64, shift: &[f64]) {
+        self.augmentations.resize_with(self.factors.len(), Augmentation::none);
+        self.augmentations[index] = Augmentation::new(scale, shift);
     }
 
     fn inspect(&self, columns: &Columns) -> Vec<FactorState> {

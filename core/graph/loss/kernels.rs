@@ -5,6 +5,30 @@ use crate::registry::checked::Positive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// An equality constraint: the residual has to be zero. Its noise gives the unit in which a violation is measured.
+///
+/// A solve minimizes the cost of the other factors subject to all constraints, by the method of multipliers, and the
+/// outcome has the multipliers. A constraint has to be possible: one between two fixed variables, or two that
+/// contradict each other, end the solve without a result.
+///
+/// ```toml
+/// loss = { type = "constraint" }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Constraint {}
+impl RobustLoss for Constraint {
+    /// The penalty for a violation; solvers scale and shift it.
+    #[inline]
+    fn rho(&self, s: f64) -> (f64, f64) {
+        (s, 1.0)
+    }
+    fn tempered(&self, _: Positive) -> Option<Self> {
+        Some(self.clone())
+    }
+}
+register_loss!("constraint", Constraint);
+
 /// Declares a loss with one scale: docs, default, ρ, and the scale of ρ(τs)/τ as a function of (k, τ). The
 /// latter is k/√τ by default, for scales in σ's.
 macro_rules! loss {

@@ -27,6 +27,8 @@ pub trait Column: Send + Sync {
     fn set(&mut self, index: usize, value: &dyn Variable);
     /// Returns a variable for a downcast to its type.
     fn value(&self, index: usize) -> Option<&dyn Any>;
+    /// Returns a coordinate of a variable; see [`Manifold::coordinate`].
+    fn coordinate(&self, index: usize, direction: usize) -> Option<f64>;
     /// Returns a copy of a variable.
     fn get(&self, index: usize) -> Option<Box<dyn Variable>>;
     /// `self ← from ⊞ step`; the step of variable i begins at `starts[i]`.
@@ -62,6 +64,9 @@ impl<M: Manifold + Variable> Column for Plain<M> {
     }
     fn value(&self, index: usize) -> Option<&dyn Any> {
         self.0.get(index).map(|x| x as &dyn Any)
+    }
+    fn coordinate(&self, index: usize, direction: usize) -> Option<f64> {
+        self.0.get(index)?.coordinate(direction)
     }
     fn get(&self, index: usize) -> Option<Box<dyn Variable>> {
         self.0.get(index).map(|x| Box::new(x.clone()) as Box<dyn Variable>)

@@ -35,6 +35,13 @@ pub trait Manifold: Clone + Debug + Send + Sync + 'static {
     /// Returns the tangent vector that leads to `other`.
     fn local(&self, other: &Self) -> Vector<Self::Dim>;
 
+    /// Returns the coordinate to which steps along a direction add: `x.retract(&δ).coordinate(i)` is
+    /// `x.coordinate(i) + δ[i]`, also in rounding. `None` along directions without one, such as rotations; those
+    /// cannot have bounds. Default: `None`.
+    fn coordinate(&self, _direction: usize) -> Option<f64> {
+        None
+    }
+
     /// Returns whether every coordinate is finite.
     fn is_finite(&self) -> bool;
 }

@@ -1,4 +1,5 @@
 //! The estimate: a point for each key.
+use crate::graph::OutOfBounds;
 use crate::variable::Key;
 use crate::variable::Variable;
 use crate::variable::manifold_name;
@@ -37,6 +38,9 @@ pub enum ValueError {
         /// Its key.
         key: Key,
     },
+    /// The value is out of the bounds of its variable.
+    #[error(transparent)]
+    OutOfBounds(#[from] OutOfBounds),
 }
 
 impl Values {

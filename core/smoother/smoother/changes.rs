@@ -59,10 +59,16 @@ impl Smoother {
     /// observed once. It waits with its factors, and the report names it.
     ///
     /// # Errors
-    /// If a variable exists already, if the factors do not fit (all errors are listed), or if the window is
-    /// in seconds and no time is set. Nothing is added then.
+    /// If a variable exists already or has bounds, if a factor is a constraint, if the factors do not fit (all errors are listed), or if the
+    /// window is in seconds and no time is set. Nothing is added then.
     pub fn push(&mut self, factors: &Graph, values: &Values) -> Result<Vec<FactorId>, ChangeError> {
         let time = self.schedule.time_of_new(self.pending.time)?;
+        if let Some(key) = factors.bounds().keys().next() {
+            return Err(ChangeError::Bounded { key: key.clone() });
+        }
+        if let Some(factor) = factors.factors().iter().position(FactorEntry::is_constraint) {
+            return Err(ChangeError::Constraint { factor });
+        }
         let is_known = |key: &Key| {
             self.model.variable(key.as_str()).is_some() || self.pending.variables.contains_key(key)
         };

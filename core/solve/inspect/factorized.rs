@@ -3,13 +3,14 @@ use crate::inspect::CovarianceError;
 use crate::inspect::null_space::undetermined;
 use crate::linear::Cholesky;
 use crate::linear::system::NoFactor;
-use crate::problem::Problem;
+use crate::problem::{Problem, ProblemVariable};
 use manifactor_graph::Key;
 use nalgebra::DMatrix;
 use std::time::Instant;
 
 /// The factorization of H = JᵀJ at the estimate, without damping, with the robust weights at the estimate.
-/// Covariances are blocks of H⁻¹, in the units of the noise. Fixed variables and directions have zeros.
+/// Covariances are blocks of H⁻¹, in the units of the noise. Fixed variables and directions have zeros, and so have
+/// coordinates that are held at a bound.
 ///
 /// ```
 /// # use manifactor_solve::Problem;
@@ -64,6 +65,11 @@ impl Problem {
     }
 }
 
+/// Returns the scalar unknown of each tangent direction; `None` for one that is fixed or held at a bound.
+fn free_unknowns(place: &ProblemVariable, at_bound: &[usize]) -> impl Iterator<Item = Option<usize>> {
+    place.unknowns().map(|unknown| unknown.filter(|unknown| !at_bound.contains(unknown)))
+}
+
 impl Factorized<'_> {
     /// Returns the covariance of a variable in its tangent space. Takes one half solve per tangent
     /// dimension, each along one path of the elimination tree.
@@ -79,11 +85,12 @@ impl Factorized<'_> {
     /// # Errors
     /// If a key is unknown.
     pub fn joint(&mut self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
-        // the unknown of each row of the result, `None` for a fixed direction
+        // the unknown of each row of the result, `None` for a direction that is held
         let mut unknowns = vec![];
         for key in keys {
             let place = self.problem.model.place(key);
-            unknowns.extend(place.ok_or_else(|| CovarianceError::Unknown((*key).to_owned()))?.unknowns());
+            let place = place.ok_or_else(|| CovarianceError::Unknown((*key).to_owned()))?;
+            unknowns.extend(free_unknowns(place, self.problem.system.held_at_bound()));
         }
         // H⁻¹ = L⁻ᵀL⁻¹: entries are products of columns of L⁻¹, which are zero off their paths
         let dim = self.problem.dim();
@@ -122,10 +129,11 @@ impl Factorized<'_> {
     pub fn marginals(&mut self) -> Result<Vec<(Key, DMatrix<f64>)>, CovarianceError> {
         let out_of_memory = self.problem.out_of_memory();
         let Problem { model, system, .. } = &mut *self.problem;
+        let at_bound = system.held_at_bound().to_vec();
         let inverse =
             system.cholesky().and_then(|cholesky| cholesky.selected_inverse()).ok_or(out_of_memory)?;
         let marginals = model.variables.iter().map(|place| {
-            let unknowns: Vec<_> = place.unknowns().collect();
+            let unknowns: Vec<_> = free_unknowns(place, &at_bound).collect();
             let entry = |r: usize, c: usize| match (unknowns[r], unknowns[c]) {
                 (Some(row), Some(column)) => inverse.get(row, column).unwrap_or(0.0),
                 _ => 0.0,

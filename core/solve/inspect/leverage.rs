@@ -29,6 +29,7 @@ impl Problem {
             Err(NoFactor::NotPositiveDefinite) => return Err(CovarianceError::NotPositiveDefinite),
         }
         let Self { model, system, .. } = self;
+        let at_bound = system.held_at_bound().to_vec();
         let inverse =
             system.cholesky().and_then(|cholesky| cholesky.selected_inverse()).ok_or(out_of_memory)?;
         let mut all = vec![vec![]; model.factors.len()];
@@ -41,6 +42,7 @@ impl Problem {
                 .flat_map(|(start, block)| {
                     block.chunks(rows.max(1)).enumerate().map(move |(d, j)| (start + d, j))
                 })
+                .filter(|(unknown, _)| !at_bound.contains(unknown))
                 .collect();
             let mut leverages = vec![0.0; rows];
             for (a, (i, left)) in columns.iter().enumerate() {

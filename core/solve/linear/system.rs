@@ -21,8 +21,10 @@ pub(crate) struct LinearSystem {
     /// The lower triangle of H, by compressed columns in the order of elimination.
     pub h: Vec<f64>,
     pub g: Vec<f64>,
-    /// Fixed scalar unknowns: one on the diagonal of H, zero in the rest of their rows.
+    /// Held scalar unknowns: one on the diagonal of H, zero in the rest of their rows. The first ones are fixed, the
+    /// others are held at a bound until the next linearization.
     pub held: Vec<usize>,
+    fixed: usize,
     pub method: Method,
     /// Maximum number of steps of iterative refinement after each solve.
     refinements: usize,
@@ -37,12 +39,13 @@ pub(crate) struct LinearSystem {
 }
 
 impl LinearSystem {
-    pub(crate) fn new(layout: Layout, held: Vec<usize>, method: Method, refinements: usize) -> Self {
+    pub(crate) fn new(layout: Layout, fixed: Vec<usize>, method: Method, refinements: usize) -> Self {
         Self {
             h: vec![0.0; layout.row_idx.len()],
             g: vec![0.0; layout.dim()],
             layout,
-            held,
+            fixed: fixed.len(),
+            held: fixed,
             method,
             refinements,
             damping: vec![],
@@ -63,6 +66,7 @@ impl LinearSystem {
         self.direct = None;
         self.h.fill(0.0);
         self.g.fill(0.0);
+        self.held.truncate(self.fixed);
         NormalEquations { h: &mut self.h, g: &mut self.g }
     }
 
@@ -81,6 +85,43 @@ impl LinearSystem {
         for &i in &self.held {
             self.h[self.layout.diagonal()[i]] = 1.0;
         }
+    }
+
+    /// Holds further unknowns until the next linearization.
+    pub(crate) fn hold(&mut self, unknowns: impl IntoIterator<Item = usize>) {
+        self.is_factorized = false;
+        self.direct = None;
+        self.held.extend(unknowns);
+        let is_held = self.is_held_at_bound();
+        for (column, is_column) in is_held.iter().enumerate() {
+            let range = self.layout.col_ptr[column]..self.layout.col_ptr[column + 1];
+            for (row, entry) in self.layout.row_idx[range.clone()].iter().zip(&mut self.h[range]) {
+                if *is_column || is_held[*row as usize] {
+                    *entry = 0.0;
+                }
+            }
+        }
+        for &i in &self.held[self.fixed..] {
+            self.h[self.layout.diagonal()[i]] = 1.0;
+            self.g[i] = 0.0;
+        }
+    }
+
+    /// Returns the unknowns that are held at a bound.
+    pub(crate) fn held_at_bound(&self) -> &[usize] {
+        &self.held[self.fixed..]
+    }
+
+    /// Marks the unknowns that are held at a bound.
+    fn is_held_at_bound(&self) -> Vec<bool> {
+        let mut is_held = vec![false; self.dim()];
+        self.held_at_bound().iter().for_each(|i| is_held[*i] = true);
+        is_held
+    }
+
+    /// Returns the decrease of the cost by a step, as the quadratic model predicts it: -gᵀδ - ½ δᵀHδ.
+    pub(crate) fn predicted_decrease(&self, step: &[f64]) -> f64 {
+        -dot(step, &self.g) - 0.5 * dot(step, &self.multiply(step))
     }
 
     /// Returns whether g and H are finite. In a sum of JᵀJ no entry exceeds the largest diagonal entry, so
@@ -127,7 +168,8 @@ impl LinearSystem {
             Method::ConjugateGradients(iterative) => iterative.solve(system, step, go_on),
             Method::Qr(qr) => {
                 qr.clear();
-                rows(&mut |factor| push_rows(qr, &factor));
+                let at_bound = &self.held[self.fixed..];
+                rows(&mut |factor| push_rows(qr, &factor, at_bound));
                 let held = self.held.iter().map(|i| (*i, 1.0));
                 let damped = damping.into_iter().flatten().enumerate().map(|(i, d)| (i, d.sqrt()));
                 held.chain(damped).for_each(|entry| qr.push([entry].into_iter(), 0.0));
@@ -227,15 +269,15 @@ impl LinearSystem {
     }
 }
 
-/// Adds the rows of a factor.
-fn push_rows(qr: &mut Qr, factor: &FactorRows<'_>) {
+/// Adds the rows of a factor, without the unknowns that are held at a bound.
+fn push_rows(qr: &mut Qr, factor: &FactorRows<'_>, at_bound: &[usize]) {
     let rows = factor.residual.len();
     for (row, residual) in factor.residual.iter().enumerate() {
         let entries = factor.blocks.iter().flat_map(|(start, block)| {
             let entries = block.iter().skip(row).step_by(rows);
             entries.enumerate().map(move |(c, x)| (start + c, *x))
         });
-        qr.push(entries, *residual);
+        qr.push(entries.filter(|(unknown, _)| !at_bound.contains(unknown)), *residual);
     }
 }
 

@@ -66,6 +66,8 @@ pub enum Stall {
     /// The steps have led to where the cost does not depend on a variable, although it did at the initial
     /// values. Its factors still have a cost.
     RunOff,
+    /// The cost is at a minimum, but constraints are violated.
+    Violation,
 }
 
 /// A direction along which the cost is constant.
@@ -119,6 +121,9 @@ impl fmt::Display for Termination {
                 Stall::Domain => "stalled: each step leaves the domain of a factor",
                 Stall::RunOff => {
                     "stalled: the steps ran off to where the cost does not depend on a variable; use different initial values, or add a prior"
+                }
+                Stall::Violation => {
+                    "stalled: constraints are not satisfied; they contradict each other, or the initial values are too far away"
                 }
                 Stall::Diverging => "stalled: the steps raise the cost; use levenberg_marquardt",
             }),

@@ -5,6 +5,8 @@ use crate::linear::settings::LinearSolver;
 use crate::linear::system::LinearSystem;
 use crate::outcome::Times;
 use crate::problem::Problem;
+use crate::problem::bounds::BoundedUnknowns;
+use crate::problem::constraints::Constraints;
 use crate::problem::method::{self, Blocks};
 use crate::problem::model::{Model, ProblemFactor, ProblemVariable};
 use manifactor_graph::batch::{Batch, Batches, Member};
@@ -126,7 +128,11 @@ pub(crate) fn compile(
     );
     let model = Model::new(variables, factors, columns, starts, batches);
     let system = LinearSystem::new(layout, held, method, linear.refinements);
-    Ok(Problem::new(model, system, graph.version(), times))
+    let mut problem = Problem::new(model, system, graph.version(), times);
+    problem.bounds = BoundedUnknowns::new(graph, values, &problem.model);
+    let constraints = problem.model.factors.iter().enumerate().filter(|(_, factor)| factor.is_constraint);
+    problem.constraints = Constraints::of(constraints.map(|(i, factor)| (i, factor.all_rows as usize)));
+    Ok(problem)
 }
 
 /// Rejects a graph that does not fit into memory, before allocating any of it.
@@ -222,8 +228,17 @@ fn batches(
         let (name, all_rows) =
             (factor.factor.typetag_name(), factor.factor.erased().signature().rows.unwrap_or(0) as u32);
         let own_name = factor.name.clone();
-        let mut place =
-            ProblemFactor { variables: ids, name, own_name, all_rows, rows: all_rows, batch, index: at };
+        let is_constraint = factor.is_constraint();
+        let mut place = ProblemFactor {
+            variables: ids,
+            name,
+            own_name,
+            all_rows,
+            rows: all_rows,
+            is_constraint,
+            batch,
+            index: at,
+        };
         place.observe(&factor.noise);
         factors.push(place);
     }

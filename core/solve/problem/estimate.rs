@@ -29,8 +29,8 @@ impl Problem {
     /// structure stays.
     ///
     /// # Errors
-    /// If `values` has an unknown key, a different type, or a value that is not finite. The estimate is
-    /// then unchanged.
+    /// If `values` has an unknown key, a different type, or a value that is not finite or out of its bounds.
+    /// The estimate is then unchanged.
     pub fn set_values(&mut self, values: &Values) -> Result<(), ValueError> {
         let mut known = 0;
         for place in &self.model.variables {
@@ -51,6 +51,9 @@ impl Problem {
             if let Some((key, _)) = values.iter().find(|(key, _)| is_unknown(key.as_str())) {
                 return Err(ValueError::Missing { key: key.clone() });
             }
+        }
+        if let Some(out) = self.out_of_bounds(values) {
+            return Err(out.into());
         }
         self.model.set_values(values);
         Ok(())

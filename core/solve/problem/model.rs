@@ -38,6 +38,8 @@ pub(crate) struct ProblemFactor {
     /// Rows of its residual, and the number of observed rows.
     pub all_rows: u32,
     pub rows: u32,
+    /// Whether its residual has to be zero.
+    pub is_constraint: bool,
     /// Its batch, and its index in the batch.
     pub batch: u32,
     pub index: u32,
@@ -159,6 +161,12 @@ impl Model {
         self.batches.iter_mut().for_each(|b| b.set_weights(&self.weights));
     }
 
+    /// Scales and shifts the whitened residual of a factor; see [`Batch::augment`].
+    pub(crate) fn augment(&mut self, factor: usize, scale: f64, shift: &[f64]) {
+        let (batch, index) = (self.factors[factor].batch as usize, self.factors[factor].index as usize);
+        self.batches_mut()[batch].augment(index, scale, shift);
+    }
+
     /// Adds all factors to H and g, and decides which of them are active.
     pub(crate) fn linearize(&mut self, to: &mut NormalEquations<'_>) -> Evaluation {
         let columns = &self.columns;
@@ -181,9 +189,19 @@ impl Model {
         }
     }
 
-    /// Sets the trial to `estimate ⊞ step`, and returns its cost.
-    pub(crate) fn try_step(&mut self, step: &[f64]) -> Evaluation {
-        self.retract(step);
+    /// Moves the trial of a variable along one direction.
+    pub(crate) fn move_trial(&mut self, variable: usize, direction: usize, by: f64) {
+        let place = &self.variables[variable];
+        let mut step = vec![0.0; place.tangent.len()];
+        step[direction] = by;
+        let column = self.trial.column_mut(place.column);
+        if let Some(moved) = column.get(place.index).and_then(|value| value.erased().retract(&step)) {
+            column.set(place.index, &*moved);
+        }
+    }
+
+    /// Evaluates the cost at the trial; see [`cost`](Self::cost).
+    pub(crate) fn trial_cost(&self) -> Evaluation {
         self.cost_at(&self.trial)
     }
 

@@ -47,6 +47,7 @@ impl Solution {
     /// If `graph` is not the solved graph.
     pub fn problem(&self, graph: &Graph) -> Result<Problem, CompileError> {
         let mut problem = Problem::compile(graph, &self.values)?;
+        problem.set_constraints(&self.constraints);
         if !self.weights.is_empty() {
             problem.model.set_weights(&self.weights);
         }

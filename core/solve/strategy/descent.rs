@@ -32,6 +32,8 @@ pub struct TrialStep {
     /// Share of the slope along the step due to damping, from 0 to 1: δᵀDδ / δᵀ(H + D)δ. Zero without
     /// damping.
     pub damped: f64,
+    /// Whether it was shortened at a bound, so that its length shows no convergence.
+    pub is_clipped: bool,
 }
 
 impl TrialStep {
@@ -199,27 +201,48 @@ impl<'a> Descent<'a> {
     /// Computes the step (H + diag(damping)) δ = -g. Returns `false` if the matrix is not positive
     /// definite, δ is not finite, or an observer has interrupted the solve.
     pub fn damped(&mut self, damping: &[f64], step: &mut TrialStep) -> bool {
-        if !self.factorize(Some(damping)) || !self.newton_step(&mut step.delta) {
+        if !self.step_within_bounds(&mut step.delta, |descent| descent.factorize(Some(damping))) {
             return false;
         }
         let damped = step.delta.iter().zip(damping).map(|(d, a)| a * d * d).sum::<f64>();
         let slope = -dot(&step.delta, &self.problem.system.g);
-        step.predicted = 0.5 * (damped + slope);
         step.damped = if slope > 0.0 { damped / slope } else { 0.0 };
-        step.norm = norm(&step.delta);
+        self.clip(step, 0.5 * (damped + slope));
         true
     }
 
     /// Computes the step H δ = -g; see [`damped`](Self::damped). The step does not move along undetermined
     /// directions.
     pub fn undamped(&mut self, step: &mut TrialStep) -> bool {
-        if !self.factorize_undamped() || !self.newton_step(&mut step.delta) {
+        if !self.step_within_bounds(&mut step.delta, Self::factorize_undamped) {
             return false;
         }
-        step.predicted = -0.5 * dot(&step.delta, &self.problem.system.g);
         step.damped = 0.0;
-        step.norm = norm(&step.delta);
+        let predicted = -0.5 * dot(&step.delta, &self.problem.system.g);
+        self.clip(step, predicted);
         true
+    }
+
+    /// Factorizes, and computes a step. Unknowns at a bound that the step would cross are held, and the step is
+    /// computed again. Returns whether it succeeded.
+    fn step_within_bounds(&mut self, delta: &mut Vec<f64>, factorize: impl Fn(&mut Self) -> bool) -> bool {
+        loop {
+            if !factorize(self) || !self.newton_step(delta) {
+                return false;
+            }
+            // each round holds at least one more unknown
+            if !self.problem.hold_crossing(delta) {
+                return true;
+            }
+        }
+    }
+
+    /// Shortens a step at the bounds. `predicted` is its predicted decrease if it needs none.
+    fn clip(&self, step: &mut TrialStep, predicted: f64) {
+        step.is_clipped = self.problem.clip(&mut step.delta);
+        step.predicted =
+            if step.is_clipped { self.problem.system.predicted_decrease(&step.delta) } else { predicted };
+        step.norm = norm(&step.delta);
     }
 
     /// Factorizes H + diag(damping), and computes the first half of the step from -g. Returns whether it
@@ -406,8 +429,9 @@ impl<'a> Descent<'a> {
         if let Some(termination) = self.not_finite() {
             return Some(termination);
         }
-        // continue, since factors that become defined again change the cost
-        if self.at.inactive != inactive {
+        // continue, since factors that become defined again change the cost, and a step that ends at a bound may be
+        // short
+        if self.at.inactive != inactive || step.is_clipped {
             return None;
         }
         let reason = if is_small {

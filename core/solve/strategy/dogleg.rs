@@ -128,11 +128,12 @@ impl Dogleg {
             loop {
                 // a step that is small because of the radius does not show convergence
                 let is_cut = promises && within < whole;
-                let delta = path.point(within);
-                let (g, length) = (dot(&delta, descent.gradient()), path.length(&delta));
-                let predicted = -g - 0.5 * dot(&delta, &descent.problem.system.multiply(&delta));
+                let mut delta = path.point(within);
+                let is_clipped = descent.problem.clip(&mut delta) || newton.is_clipped;
+                let length = path.length(&delta);
                 let step = TrialStep {
-                    predicted,
+                    predicted: descent.problem.system.predicted_decrease(&delta),
+                    is_clipped,
                     norm: norm(&delta),
                     control: within,
                     delta,
@@ -154,7 +155,9 @@ impl Dogleg {
                         _ => continue 'linearized,
                     }
                 }
-                if !is_cut && !matches!(tried, TrialResult::Undefined) && descent.shows_no_decrease(&step) {
+                let may_settle = !is_cut && !step.is_clipped;
+                if may_settle && !matches!(tried, TrialResult::Undefined) && descent.shows_no_decrease(&step)
+                {
                     let settled = Termination::Converged { reason: Tolerance::RelativeCost };
                     if descent.ends(&settled, step.predicted) {
                         return settled;

@@ -121,7 +121,7 @@ impl Gnc {
                 .get_or_insert_with(|| 0.5 * square.unwrap_or_else(|| self.probability.chi_squared(rows)))
         };
         let one = |(may, factor): (bool, &ProblemFactor)| {
-            let candidate = may && named(factor.name) && factor.rows > 0;
+            let candidate = may && !factor.is_constraint && named(factor.name) && factor.rows > 0;
             candidate.then(|| bound(factor.rows as usize))
         };
         may.into_iter().zip(&problem.model.factors).map(one).collect()

@@ -210,7 +210,7 @@ impl LevenbergMarquardt {
                         } else {
                             None
                         };
-                    if let Some(reason) = reason.filter(|_| is_trusted)
+                    if let Some(reason) = reason.filter(|_| is_trusted && !step.is_clipped)
                         && !doubt.is_some_and(|share| descent.predicts_decrease(&mut step, share))
                     {
                         let settled = Termination::Converged { reason };

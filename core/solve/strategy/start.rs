@@ -24,13 +24,27 @@ pub trait Start: Debug + Send + Sync {
     }
 }
 
+impl dyn Start + '_ {
+    /// Returns the initial values of a solve: those of [`start`](Self::start), moved into the bounds of their
+    /// variables.
+    ///
+    /// # Errors
+    /// As [`start`](Self::start), or if one of `values` is out of its bounds.
+    pub fn initial_values(&self, graph: &Graph, values: &Values) -> Result<Values, StartError> {
+        match graph.out_of_bounds(values) {
+            Some(out) => Err(ValueError::from(out).into()),
+            None => Ok(graph.within_bounds(self.start(graph, values)?)),
+        }
+    }
+}
+
 manifactor_graph::kind!(dyn Start, "start");
 
 /// The error of a start without initial values.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StartError {
-    /// A variable has a different type than its factor requires.
+    /// A value has a different type than its factor requires, or is out of its bounds.
     #[error(transparent)]
     Value(#[from] ValueError),
     /// The noise of a factor does not fit its residual.

@@ -63,7 +63,7 @@ impl ShowGraph {
         }
         let mut status = Status::Done;
         let mut after = None;
-        let start = input.start.start(&input.graph, &input.values).map_err(Failure::input)?;
+        let start = input.start.initial_values(&input.graph, &input.values).map_err(Failure::input)?;
         let solution;
         if self.solve {
             solution = solve(&input.graph, &start, &*input.optimizer, &mut Silent).map_err(Failure::input)?;

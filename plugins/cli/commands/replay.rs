@@ -257,7 +257,7 @@ fn leave_out(step: &mut ReplayStep, session: &Smoother) -> usize {
     for entry in step.factors.factors().iter().filter(|entry| entry.keys.iter().all(is_there)) {
         factors.push(entry.clone());
     }
-    step.factors.fixed().iter().for_each(|(key, held)| factors.set_fixed(key, held.clone()));
+    factors.hold_all_like(&step.factors);
     let left_out = step.factors.factors().len() - factors.factors().len();
     step.factors = factors;
     left_out

@@ -54,7 +54,7 @@ impl Solve {
         let mut interrupt = interrupt::on_ctrl_c();
         let mut observer = AllObservers(vec![&mut watch, &mut interrupt]);
         let clock = Instant::now();
-        let values = input.start.start(&input.graph, &input.values).map_err(Failure::input)?;
+        let values = input.start.initial_values(&input.graph, &input.values).map_err(Failure::input)?;
         let start = clock.elapsed().as_secs_f64();
         let solution = solve(&input.graph, &values, &*input.optimizer, &mut observer);
         let solution = solution.map_err(Failure::input)?;
@@ -110,6 +110,8 @@ impl Solve {
             "termination": outcome.termination,
             "undetermined": outcome.undetermined,
             "moving": outcome.moving,
+            "active_bounds": outcome.active_bounds,
+            "constraints": outcome.constraints,
             "untouched": outcome.unconstrained,
             "inactive": outcome.inactive,
             "inactive_factors": outcome.inactive_factors,

@@ -6,6 +6,9 @@ use manifactor::solve::{
 };
 use serde_json::Value;
 
+/// Maximum number of constraints that are listed.
+const MAX_CONSTRAINTS: usize = 10;
+
 /// The outcome in a few lines: termination, cost and time. `details` adds the time of each stage.
 pub(crate) fn outcome(outcome: &Outcome, details: bool) -> String {
     let times = &outcome.times;
@@ -22,6 +25,15 @@ pub(crate) fn outcome(outcome: &Outcome, details: bool) -> String {
     }
     if let Some(moving) = &outcome.moving {
         out += &format!("{moving}\n");
+    }
+    for bound in &outcome.active_bounds {
+        out += &format!("{bound}\n");
+    }
+    for constraint in outcome.constraints.iter().take(MAX_CONSTRAINTS) {
+        out += &format!("{constraint}\n");
+    }
+    if outcome.constraints.len() > MAX_CONSTRAINTS {
+        out += &format!("and {} more constraints\n", outcome.constraints.len() - MAX_CONSTRAINTS);
     }
     if let Some(undetermined) = &outcome.undetermined {
         out += &format!("warning: {undetermined}\n");

@@ -7,6 +7,8 @@
     clippy::print_stdout,
     clippy::print_stderr
 )]
+mod bounds;
+mod constraints;
 mod fits;
 mod laws;
 mod long;

@@ -21,13 +21,20 @@ pub struct BalOmissions {
     pub noise: usize,
     /// Variables that are held, wholly or in part; they are written as free.
     pub held: usize,
+    /// Variables with bounds; they are written without.
+    pub bounded: usize,
 }
 
 impl BalOmissions {
     /// Returns the omitted parts as text.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = omission_notes("BAL", &self.variables, &self.factors);
-        let others = [("robust losses", self.losses), ("noise", self.noise), ("what is held", self.held)];
+        let others = [
+            ("robust losses", self.losses),
+            ("noise", self.noise),
+            ("what is held", self.held),
+            ("bounds", self.bounded),
+        ];
         for (what, n) in others.into_iter().filter(|(_, n)| *n > 0) {
             notes.push(format!("BAL cannot express {what}: {n} left out"));
         }
@@ -44,7 +51,8 @@ pub fn format(graph: &Graph, values: &Values) -> (String, BalOmissions) {
     let points: Vec<_> = values.all::<Point3>().collect();
     let camera_numbers: HashMap<&Key, usize> = cameras.iter().map(|(key, _)| *key).zip(0..).collect();
     let point_numbers: HashMap<&Key, usize> = points.iter().map(|(key, _)| *key).zip(0..).collect();
-    let mut omitted = BalOmissions { held: graph.fixed().len(), ..BalOmissions::default() };
+    let (held, bounded) = (graph.fixed().len(), graph.bounds().len());
+    let mut omitted = BalOmissions { held, bounded, ..BalOmissions::default() };
     let mut observations = vec![];
     for entry in graph.factors() {
         match observation(entry, &camera_numbers, &point_numbers) {

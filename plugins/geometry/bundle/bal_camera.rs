@@ -114,6 +114,13 @@ impl Manifold for BalCamera {
         let f = other.focal_length - self.focal_length;
         SVector::from([xi[0], xi[1], xi[2], xi[3], xi[4], xi[5], f, k.x, k.y])
     }
+    fn coordinate(&self, direction: usize) -> Option<f64> {
+        match direction {
+            6 => Some(self.focal_length),
+            7 | 8 => self.distortion.get(direction - 7).copied(),
+            _ => None,
+        }
+    }
     fn is_finite(&self) -> bool {
         let numbers = [self.focal_length, self.distortion.x, self.distortion.y];
         self.world_from_camera.is_finite() && numbers.iter().all(|x| x.is_finite())

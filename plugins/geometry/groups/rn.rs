@@ -101,6 +101,9 @@ impl<const N: usize> Manifold for Rn<N> {
     fn local(&self, other: &Self) -> SVector<f64, N> {
         other.0 - self.0
     }
+    fn coordinate(&self, direction: usize) -> Option<f64> {
+        self.0.get(direction).copied()
+    }
     fn is_finite(&self) -> bool {
         self.0.iter().all(|x| x.is_finite())
     }

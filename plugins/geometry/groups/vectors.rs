@@ -82,6 +82,9 @@ macro_rules! vector {
             fn local(&self, other: &Self) -> SVector<f64, $n> {
                 other.0 - self.0
             }
+            fn coordinate(&self, direction: usize) -> Option<f64> {
+                self.0.get(direction).copied()
+            }
             fn is_finite(&self) -> bool {
                 self.0.iter().all(|x| x.is_finite())
             }

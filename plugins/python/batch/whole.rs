@@ -122,6 +122,9 @@ impl Batch for Whole {
     fn set_weights(&mut self, weights: &[f64]) {
         self.inner.set_weights(weights);
     }
+    fn augment(&mut self, index: usize, scale: f64, shift: &[f64]) {
+        self.inner.augment(index, scale, shift);
+    }
     fn inspect(&self, columns: &Columns) -> Vec<FactorState> {
         self.compute(None, columns, false);
         self.inner.inspect(columns)

@@ -182,6 +182,17 @@ class Graph:
     def fixed(self) -> Mapping[str, bool | list[str]]:
         """The fixed variables by key: `True`, or the names of the fixed directions. `fix` and `free` change
         them."""
+    def bound(
+        self, key: _Key, direction: str, *, min: float | None = None, max: float | None = None
+    ) -> None:
+        """Bounds a coordinate of a variable, which steps do not cross: `graph.bound("scale", "x", min=0.5)`.
+        Coordinates are those to which steps add, such as those of a point or the focal length of a camera."""
+    def unbound(self, key: _Key) -> None:
+        """Removes the bounds of a variable."""
+    @property
+    def bounds(self) -> Mapping[str, dict[str, tuple[float, float]]]:
+        """The bounds by key: for each bounded direction `(min, max)`, infinite on a side without a limit.
+        `bound` and `unbound` change them."""
     def check(self, values: Values) -> list[str]:
         """Returns all errors of the graph with these values; empty if it can be solved."""
     def cost(self, values: Values) -> float:
@@ -196,7 +207,7 @@ class Graph:
     def __iter__(self) -> Iterator[FactorEntry]: ...
     def __len__(self) -> int: ...
     def __add__(self, other: Graph) -> Graph:
-        """Returns a graph with the factors and fixed variables of both."""
+        """Returns a graph with the factors, fixed variables and bounds of both."""
     def __iadd__(self, other: Graph) -> Self: ...
     def __copy__(self) -> Graph: ...
     def __deepcopy__(self, memo: Any) -> Graph: ...

@@ -19,3 +19,30 @@ fn a_curve_is_fitted_in_a_document_of_ten_lines() {
         assert!((found / certified - 1.0).abs() < 1e-8, "{found} {certified}");
     }
 }
+
+#[test]
+fn a_bound_holds_the_fit() {
+    let folder = folder(&[("bounded.toml", &block("least-squares.md", "toml", "max = 200.0"))]);
+    let graph = path(&folder, "bounded.toml");
+    let ran = manifactor(&format!("solve {graph}")).ended(0);
+    assert!(ran.stdout.contains("b1.x is at its maximum, 200 (multiplier "), "{}", ran.stdout);
+    let ran = manifactor(&format!("solve {graph} --covariances --json")).ended(0);
+    let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    let [bound] = &report["active_bounds"].as_array().unwrap()[..] else { panic!("{report}") };
+    assert_eq!((&bound["key"], &bound["side"]), (&"b1".into(), &"max".into()));
+    assert_eq!(report["covariances"][0]["covariance"][0][0], 0.0);
+    assert!(report["covariances"][1]["covariance"][0][0].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn a_constraint_is_satisfied() {
+    let folder = folder(&[("constrained.toml", &block("least-squares.md", "toml", "\"constraint\""))]);
+    let graph = path(&folder, "constrained.toml");
+    let ran = manifactor(&format!("solve {graph}")).ended(0);
+    assert!(ran.stdout.contains("constraint 13 expression (b1, b2): multiplier "), "{}", ran.stdout);
+    let ran = manifactor(&format!("solve {graph} --json")).ended(0);
+    let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    assert!(report["constraints"][0]["residual"][0].as_f64().unwrap().abs() < 1e-9, "{report}");
+    let [b1, b2] = ["b1", "b2"].map(|key| report["values"][key]["position"][0].as_f64().unwrap());
+    assert!((b1 * (1.0 - (-b2 * 760.0).exp()) - 81.78).abs() < 1e-9);
+}

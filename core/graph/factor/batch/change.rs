@@ -55,6 +55,9 @@ impl<F: Kernel> BatchOf<F> {
         if !self.weights.is_empty() {
             self.weights.swap_remove(index);
         }
+        if !self.augmentations.is_empty() {
+            self.augmentations.swap_remove(index);
+        }
         self.entries.get(index).map(|entry| *entry as usize)
     }
 

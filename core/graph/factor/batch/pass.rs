@@ -130,6 +130,9 @@ impl<F: Kernel> BatchOf<F> {
         let r = r.as_mut_slice();
         r.copy_from_slice(value.as_ref());
         self.whiteners.whiten(i, r);
+        if let Some(augmentation) = self.augmentations.get(i) {
+            augmentation.apply(r);
+        }
         Some(r.iter().map(|x| x * x).sum())
     }
 
@@ -318,6 +321,10 @@ impl<F: Kernel> WithSimd for Whiten<'_, F> {
             let i = self.first + k;
             let r = work.r[k].as_mut_slice();
             batch.whiteners.whiten(i, r);
+            let augmentation = batch.augmentations.get(i);
+            if let Some(augmentation) = augmentation {
+                augmentation.apply(r);
+            }
             work.w[k] = r.iter().map(|x| x * x).sum();
             let range = BatchOf::<F>::range(&batch.ends, i);
             let fixed = if batch.fixed.is_empty() { &[][..] } else { &batch.fixed[range] };
@@ -326,6 +333,9 @@ impl<F: Kernel> WithSimd for Whiten<'_, F> {
                 #[inline(always)]
                 |a, block| {
                     batch.whiteners.whiten(i, block);
+                    if let Some(augmentation) = augmentation {
+                        augmentation.scale(block);
+                    }
                     if let Some(fixed) = fixed.get(a) {
                         clear_fixed_columns::<F::Dim>(*fixed, block);
                     }

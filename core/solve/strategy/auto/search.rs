@@ -42,7 +42,7 @@ fn registered() -> &'static [Box<dyn Start>] {
 pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> Vec<Point> {
     let mut point = |start: &dyn Start| {
         // a start that does not apply is skipped
-        let values = start.start(graph, values).ok()?;
+        let values = start.initial_values(graph, values).ok()?;
         problem.set_values(&values).ok()?;
         let at = problem.linearize();
         let point = Point { inactive: at.inactive, cost: at.cost, values, damping: None };

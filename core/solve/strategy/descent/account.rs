@@ -1,6 +1,7 @@
 //! Records of the steps of a solve, and its outcome.
 use super::{Descent, TrialStep};
 use crate::outcome::{IterationRecord, Outcome, Stall, Termination, Undetermined};
+use crate::problem::CONSTRAINT_TOLERANCE;
 
 impl Descent<'_> {
     /// Records the last trial step, and passes it to the observer.
@@ -31,6 +32,15 @@ impl Descent<'_> {
         self.account(termination, open)
     }
 
+    /// Returns whether the estimate violates constraints that nothing drives to zero: a descent alone takes them as
+    /// factors.
+    fn violates_constraints(&self) -> bool {
+        let constraints = &self.problem.constraints;
+        !constraints.is_empty()
+            && !constraints.are_driven()
+            && self.problem.violation() > CONSTRAINT_TOLERANCE
+    }
+
     /// Returns the outcome of the solve, with the given undetermined direction.
     pub(crate) fn account(
         &mut self,
@@ -57,6 +67,9 @@ impl Descent<'_> {
                 Termination::Converged { .. }
                 | Termination::Stalled { reason: Stall::Damping | Stall::TrustRegion },
             ) if self.has_run_off() => Termination::Stalled { reason: Stall::RunOff },
+            (None, Termination::Converged { .. }) if self.violates_constraints() => {
+                Termination::Stalled { reason: Stall::Violation }
+            }
             (_, termination) => termination,
         };
         Outcome {
@@ -66,6 +79,8 @@ impl Descent<'_> {
             termination,
             undetermined,
             moving,
+            active_bounds: self.problem.active_bounds(),
+            constraints: vec![],
             unconstrained,
             factors: self.problem.factors(),
             inactive: self.at.inactive,

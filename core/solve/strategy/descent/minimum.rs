@@ -93,6 +93,7 @@ impl Descent<'_> {
         };
         let mut steps: Vec<f64> = self.problem.system.diagonal().enumerate().map(step).collect();
         self.problem.system.held.iter().for_each(|i| steps[*i] = 0.0);
+        self.problem.clip_both_ways(&mut steps);
         steps
     }
 
@@ -212,7 +213,7 @@ impl Descent<'_> {
     fn hessian_product(&mut self, direction: &[f64], steps: &[f64], gradient: &[f64]) -> Option<Vec<f64>> {
         let share = shortest(direction, steps)?;
         let step: Vec<f64> = direction.iter().map(|d| DIFFERENCE_SHARE * share * d).collect();
-        self.problem.model.retract(&step);
+        self.problem.retract(&step);
         self.problem.model.accept();
         let there = self.problem.linearize_keeping_factor();
         let mut product: Vec<f64> = self.problem.system.g.iter().zip(gradient).map(|(a, b)| a - b).collect();
@@ -228,18 +229,19 @@ impl Descent<'_> {
         let steps = self.probe_steps();
         let Some(share) = shortest(direction, &steps) else { return false };
         let enough = self.at.cost * (1.0 - self.stop.relative_cost().max(ROUNDING_SHARE));
-        let mut best: Option<(f64, Vec<f64>)> = None;
+        let mut best: Option<(f64, f64)> = None;
         for sign in [1.0, -1.0] {
             let mut size = sign * share;
             let mut before = self.at.cost;
             while let Some(cost) = self.cost_beside(direction, size).filter(|cost| *cost < before) {
                 if cost < enough && best.as_ref().is_none_or(|(least, _)| cost < *least) {
-                    best = Some((cost, direction.iter().map(|d| size * d).collect()));
+                    best = Some((cost, size));
                 }
                 (before, size) = (cost, 2.0 * size);
             }
         }
-        let Some((cost, step)) = best else { return false };
+        let Some((cost, size)) = best else { return false };
+        let step: Vec<f64> = direction.iter().map(|d| size * d).collect();
         tracing::debug!(cost, "left a stationary point that is no minimum");
         self.move_by(&step);
         self.at.not_finite.is_none()
@@ -254,7 +256,7 @@ impl Descent<'_> {
     }
 
     fn move_by(&mut self, step: &[f64]) {
-        self.problem.model.retract(step);
+        self.problem.retract(step);
         self.problem.model.accept();
         self.at = self.problem.linearize();
         self.trial = self.at;

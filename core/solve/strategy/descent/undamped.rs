@@ -42,10 +42,14 @@ impl Descent<'_> {
     /// Returns whether an undamped step predicts a decrease of more than this share of the cost. Leaves
     /// that step in `step`.
     pub(crate) fn predicts_decrease(&mut self, step: &mut TrialStep, share: f64) -> bool {
-        let can_step =
-            self.at.not_finite.is_none() && self.factorize(None) && self.newton_step(&mut step.delta);
-        step.predicted = -0.5 * dot(&step.delta, &self.problem.system.g);
-        can_step && step.predicted > share * self.at.cost
+        if self.at.not_finite.is_some()
+            || !self.step_within_bounds(&mut step.delta, |descent| descent.factorize(None))
+        {
+            return false;
+        }
+        let predicted = -0.5 * dot(&step.delta, &self.problem.system.g);
+        self.clip(step, predicted);
+        step.predicted > share * self.at.cost
     }
 
     /// Returns the undetermined direction at the end of a solve with undamped steps, if there was one on

@@ -32,6 +32,9 @@ impl Manifold for Plane {
     fn local(&self, other: &Self) -> Vector2<f64> {
         Vector2::new(other.x - self.x, other.y - self.y)
     }
+    fn coordinate(&self, direction: usize) -> Option<f64> {
+        [self.x, self.y].get(direction).copied()
+    }
     fn is_finite(&self) -> bool {
         self.x.is_finite() && self.y.is_finite()
     }

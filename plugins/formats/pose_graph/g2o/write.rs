@@ -20,6 +20,8 @@ pub struct G2oOmissions {
     pub losses: usize,
     /// Variables with some directions held; they are written as free.
     pub partly_fixed: Vec<Key>,
+    /// Variables with bounds; they are written without.
+    pub bounded: Vec<Key>,
     /// New vertex numbers, if the keys are not all `x<id>` for poses and `l<id>` for points.
     pub renamed: Vec<(Key, u64)>,
 }
@@ -34,6 +36,9 @@ impl G2oOmissions {
         if !self.partly_fixed.is_empty() {
             let n = self.partly_fixed.len();
             notes.push(format!("g2o cannot express held directions: {n} left out"));
+        }
+        if !self.bounded.is_empty() {
+            notes.push(format!("g2o cannot express bounds: {} left out", self.bounded.len()));
         }
         if !self.renamed.is_empty() {
             let renamed = count(self.renamed.len(), "variable");
@@ -56,6 +61,7 @@ pub fn format(graph: &Graph, values: &Values) -> (String, G2oOmissions) {
     for (key, fixed) in graph.fixed() {
         writer.fix(key, fixed);
     }
+    writer.omitted.bounded.extend(graph.bounds().keys().cloned());
     let has_sensor = |entry: &FactorEntry| {
         downcast::<Landmark<3>>(entry).is_some() || downcast::<Prior<Se3>>(entry).is_some()
     };

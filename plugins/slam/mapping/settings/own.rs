@@ -27,6 +27,16 @@ impl OwnGraph {
             let help = "x0, x1, … are the poses and q0, q1, … the objects of a run: choose another name";
             section.report("variables", Fault::with_help(message, help));
         }
+        // a run with an incremental solver, or from a stream, would keep neither bounds nor constraints
+        if let Some(key) = graph.bounds().keys().next() {
+            let message = format!("`{key}` has bounds, and a run has none");
+            let help = "leave them out, or solve a graph of its own with `manifactor solve`";
+            section.report("variables", Fault::with_help(message, help));
+        }
+        if let Some(factor) = graph.factors().iter().position(FactorEntry::is_constraint) {
+            let message = format!("factor {factor} is a constraint, and a run has none");
+            section.report("factors", Fault::with_help(message, "give it a small noise instead"));
+        }
         Self { graph, values }
     }
 
@@ -44,10 +54,7 @@ impl OwnGraph {
         for (key, value) in self.values.iter() {
             values.insert_boxed(key.clone(), value.erased().clone_box());
         }
-        for (key, fixed) in self.graph.fixed() {
-            graph.set_fixed(key.clone(), fixed.clone());
-        }
-        graph.factors_mut().extend(self.graph.factors().iter().cloned());
+        graph.extend(&self.graph);
     }
 }
 
