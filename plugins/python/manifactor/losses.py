@@ -9,6 +9,7 @@ from .chosen import Loss, Number
 
 __all__ = [
     "cauchy",
+    "constraint",
     "dcs",
     "fair",
     "geman_mcclure",
@@ -32,6 +33,20 @@ def cauchy(*, scale: Number | None = None) -> Loss:
         scale: The scale k of the formula above, in σ's. Default: 1.0.
     """
     return Loss("cauchy", {"scale": scale})
+
+
+def constraint() -> Loss:
+    """An equality constraint: the residual has to be zero. Its noise gives the unit in which a violation is measured.
+
+    A solve minimizes the cost of the other factors subject to all constraints, by the method of multipliers, and the
+    outcome has the multipliers. A constraint has to be possible: one between two fixed variables, or two that
+    contradict each other, end the solve without a result.
+
+    ```toml
+    loss = { type = "constraint" }
+    ```
+    """
+    return Loss("constraint", {})
 
 
 def dcs(*, scale: Number | None = None) -> Loss:
