@@ -37,11 +37,11 @@ def test_fits_within_bounds_agree_with_scipy() -> None:
         assert solution.cost <= expected.cost * (1 + 1e-6)
         found = np.array([solution.values[name].position[0] for name in names])
         np.testing.assert_allclose(found, expected.x, atol=2e-3)
-        for bound in solution.report["active_bounds"]:
+        for bound in solution.outcome["active_bounds"]:
             i = names.index(bound["key"])
             assert found[i] == bound["value"] == (low if bound["side"] == "min" else high)[i]
             assert bound["multiplier"] == pytest.approx(abs(expected.grad[i]), rel=1e-2, abs=1e-3)
-        active += len(solution.report["active_bounds"])
+        active += len(solution.outcome["active_bounds"])
     assert active > 20
 
 
@@ -102,7 +102,7 @@ def test_constraints_are_satisfied() -> None:
     solution = mf.solve(graph, values)
     assert solution.converged
     np.testing.assert_allclose(solution.values["p"].position, [1.2, 1.6], atol=1e-9)
-    [state] = solution.report["constraints"]
+    [state] = solution.outcome["constraints"]
     # (p - (3, 4)) + 2 λ p = 0
     assert state["multipliers"][0] == pytest.approx((3 / 1.2 - 1) / 2, rel=1e-6)
     assert solution.cost == pytest.approx(4.5) == graph.cost(solution.values)
