@@ -1,5 +1,4 @@
 //! The dynamic view of a graph, for building, editing, reading and writing.
-mod bounds;
 mod version;
 
 use crate::factor::{Factor, FactorEntry};
@@ -8,6 +7,7 @@ use crate::variable::Key;
 use crate::variable::Values;
 use crate::variable::Variable;
 use crate::variable::manifold_name;
+use crate::variable::{Bounds, Interval, OutOfBounds};
 use indexmap::IndexMap;
 use nalgebra::DVector;
 use serde::de::value::SeqAccessDeserializer;
@@ -18,7 +18,6 @@ use std::any::TypeId;
 use std::fmt;
 use std::sync::Arc;
 
-pub use bounds::{Bounds, Interval, IntervalError, OutOfBounds};
 pub use version::Version;
 
 /// Factors between named variables, the fixed variables, and the bounds of variables.
@@ -187,7 +186,7 @@ pub enum GraphError {
         "`{key}` ({found}) cannot have bounds along `{direction}`: bounds are for coordinates to which steps add, such as \
          those of a point3"
     )]
-    Unboundable {
+    NoCoordinate {
         /// The key.
         key: Key,
         /// The requested direction.
@@ -383,7 +382,7 @@ impl Graph {
         }
         for (key, bounds) in &self.bounds {
             match values.variable(key.as_str()) {
-                Some(value) => bounds.check(key, value, &mut errors),
+                Some(value) => check_bounds(key, bounds, value, &mut errors),
                 None => errors.push(GraphError::MissingBounded { key: key.clone() }),
             }
         }
@@ -391,6 +390,22 @@ impl Graph {
         errors.extend(bad.map(|(key, _)| GraphError::NotFinite { key: key.clone() }));
         if errors.is_empty() { Ok(resolved) } else { Err(errors) }
     }
+}
+
+/// Reports directions that cannot be bounded, and coordinates that are out of bounds.
+fn check_bounds(key: &Key, bounds: &Bounds, value: &dyn Variable, errors: &mut Vec<GraphError>) {
+    let tangent = value.erased().tangent();
+    for (direction, _) in bounds.iter() {
+        let (key, direction) = (key.clone(), direction.to_owned());
+        match tangent.iter().position(|name| *name == direction) {
+            None => errors.push(GraphError::UnknownDirection { key, direction, tangent }),
+            Some(index) if value.erased().coordinate(index).is_none() => {
+                errors.push(GraphError::NoCoordinate { key, direction, found: value.typetag_name() });
+            }
+            Some(_) => {}
+        }
+    }
+    errors.extend(bounds.out_of_bounds(key, value).map(GraphError::OutOfBounds));
 }
 
 /// Indices of a factor's variables among the values. Up to four need no allocation.

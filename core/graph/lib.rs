@@ -22,16 +22,15 @@ pub use algebra::{
 };
 pub use factor::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows, batch, invariance};
 pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, Unnamed, signature};
-pub use graph::{
-    Bounds, Fixed, Graph, GraphError, Interval, IntervalError, OutOfBounds, Resolved, VariableIndices,
-    Version,
-};
+pub use graph::{Fixed, Graph, GraphError, Resolved, VariableIndices, Version};
 pub use manifactor_document::TextError;
 pub use noise::Noise;
 pub use registry::{TypeName, UnknownType, catalogue, checked};
 pub use residual::{Jacobians, Lifted, List, Many, Refs, Residual, Variables, normal_equations};
 pub use variable::{AsVariable, ErasedManifold, Variable, as_variable, column, manifold_name};
-pub use variable::{Key, Manifold, Tangent, ValueError, Values};
+pub use variable::{
+    Bounds, Interval, IntervalError, Key, Manifold, OutOfBounds, Tangent, ValueError, Values,
+};
 
 #[doc(hidden)]
 pub mod __private {

@@ -1,4 +1,5 @@
 //! Values in a graph: points of registered manifolds.
+mod bounds;
 pub mod column;
 mod key;
 mod manifold;
@@ -10,6 +11,7 @@ use crate::variable::column::{Column, Plain};
 use std::any::{Any, TypeId};
 use std::fmt::Debug;
 
+pub use bounds::{Bounds, Interval, IntervalError, OutOfBounds};
 pub use key::Key;
 pub use manifold::{Manifold, Tangent};
 pub use values::{ValueError, Values};

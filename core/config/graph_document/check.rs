@@ -91,7 +91,7 @@ fn place(read: &Read<'_>, error: &GraphError, root: &Place) -> Option<Diagnostic
             let problem = Fault::UnknownName { what: "direction".into(), name: direction.clone(), known };
             Diagnostic::new(place.unwrap_or_else(|| at_variable(key)), problem)
         }
-        GraphError::Unboundable { key, direction, .. } => {
+        GraphError::NoCoordinate { key, direction, .. } => {
             Diagnostic::new(at(bound(key, direction)), Fault::invalid(error.to_string()))
         }
         GraphError::OutOfBounds(OutOfBounds { key, direction, .. }) => {

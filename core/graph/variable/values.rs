@@ -1,6 +1,6 @@
 //! The estimate: a point for each key.
-use crate::graph::OutOfBounds;
 use crate::variable::Key;
+use crate::variable::OutOfBounds;
 use crate::variable::Variable;
 use crate::variable::manifold_name;
 use indexmap::IndexMap;

@@ -49,7 +49,7 @@ pub(crate) struct BoundedUnknowns {
 }
 
 impl BoundedUnknowns {
-    /// Returns the bounds of a graph. Those of fixed directions are left out, as the values are checked.
+    /// Returns the bounds of a graph, without bounds on fixed directions, whose values were checked.
     pub(super) fn new(graph: &Graph, values: &Values, model: &Model) -> Self {
         if graph.bounds().is_empty() {
             return Self::default();

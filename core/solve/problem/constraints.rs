@@ -18,7 +18,7 @@ struct Constraint {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Constraints {
     all: Vec<Constraint>,
-    /// μ; zero as long as no solver drives the constraints.
+    /// μ; zero outside of the method of multipliers.
     penalty: f64,
 }
 
@@ -30,8 +30,8 @@ impl Constraints {
     pub(crate) fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
-    /// Returns whether a solver drives the multipliers, so that a violation does not make its solve invalid.
-    pub(crate) fn are_driven(&self) -> bool {
+    /// Returns whether the method of multipliers has set a penalty, so that it checks the violation itself.
+    pub(crate) fn have_penalty(&self) -> bool {
         self.penalty > 0.0
     }
 }
@@ -79,7 +79,7 @@ impl Problem {
 
     /// Returns a penalty with which the constraints are stiff beside the other factors, whatever their units.
     pub(crate) fn stiff_penalty(&mut self) -> f64 {
-        /// Information of the constraints, as a multiple of that of the other factors in the same unknowns.
+        /// Ratio of the information from constraints to the information from other factors, in the same unknowns.
         const STIFFNESS: f64 = 100.0;
         let mut diagonal = |scale: f64| -> Vec<f64> {
             for constraint in &self.constraints.all {
@@ -117,7 +117,7 @@ impl Problem {
     /// Takes over the multipliers and the penalty of an earlier problem of the same graph.
     pub(crate) fn set_constraints(&mut self, constraints: &Constraints) {
         self.constraints = constraints.clone();
-        if constraints.are_driven() {
+        if constraints.have_penalty() {
             self.set_penalty(constraints.penalty);
         }
     }

@@ -10,6 +10,7 @@ use crate::outcome::Termination;
 use crate::problem::CompileError;
 use crate::problem::Problem;
 use crate::strategy::descent::Descent;
+use crate::strategy::dogleg::Dogleg;
 use crate::strategy::gauss_newton::GaussNewton;
 use crate::strategy::levenberg_marquardt::LevenbergMarquardt;
 use crate::strategy::optimizer::{Optimizer, Stopping};
@@ -32,7 +33,7 @@ pub(crate) use search::starts;
 ///
 /// None of this depends on the unit of the noise: covariances that are too small by a factor have no
 /// effect. If no start applies, the solver is Levenberg-Marquardt with almost no damping. Starts need the
-/// graph, and the starts of a plugin are available once it is linked. A compiled problem alone (`descend`)
+/// graph, and the starts of a plugin are available once it is linked. A graph with constraints is solved by `dogleg`. A compiled problem alone (`descend`)
 /// is therefore solved by damped steps from its current estimate.
 ///
 /// ```toml
@@ -67,6 +68,11 @@ impl Optimizer for Auto {
     }
 
     fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+        // JᵀJ lacks the curvature of constraints, so that full steps overshoot; a radius adapts to it
+        if !problem.constraints.is_empty() {
+            let dogleg = Dogleg { stop: self.stop.clone(), linear: self.linear.clone(), ..Dogleg::default() };
+            return dogleg.descend(problem, observer);
+        }
         self.damped(INITIAL_DAMPING, problem, observer)
     }
 

@@ -66,45 +66,39 @@ fn problem_25_keeps_its_power_defined() {
     }
 }
 
+/// Wood's function, the objective of problem 38.
+const WOOD: [&str; 6] = [
+    "10 * (x2 - x1^2)",
+    "1 - x1",
+    "sqrt(90) * (x4 - x3^2)",
+    "1 - x3",
+    "sqrt(10) * (x2 + x4 - 2)",
+    "(x2 - x4) / sqrt(10)",
+];
+
 #[test]
 fn problem_38_has_its_minimum_within_the_bounds() {
-    let residual = [
-        "10 * (x2 - x1^2)",
-        "1 - x1",
-        "sqrt(90) * (x4 - x3^2)",
-        "1 - x3",
-        "sqrt(10) * (x2 + x4 - 2)",
-        "(x2 - x4) / sqrt(10)",
-    ];
     for solver in solvers() {
         let bounds = [-10.0..=10.0, -10.0..=10.0, -10.0..=10.0, -10.0..=10.0];
-        let solution = fit(&residual, 1, &[-3.0, -1.0, -3.0, -1.0], &bounds, &*solver);
+        let solution = fit(&WOOD, 1, &[-3.0, -1.0, -3.0, -1.0], &bounds, &*solver);
         assert_close(&solution, &[1.0, 1.0, 1.0, 1.0]);
     }
 }
 
 #[test]
 fn woods_function_presses_against_a_tighter_bound() {
-    // problem 38 with x1 at most 0.8: two unknowns fewer would be wrong, so the conditions are checked by hand
-    let residual = [
-        "10 * (x2 - x1^2)",
-        "1 - x1",
-        "sqrt(90) * (x4 - x3^2)",
-        "1 - x3",
-        "sqrt(10) * (x2 + x4 - 2)",
-        "(x2 - x4) / sqrt(10)",
-    ];
+    // problem 38 with x1 at most 0.8
     let mut costs = vec![];
     for solver in solvers() {
         let bounds = [-10.0..=0.8, -10.0..=10.0, -10.0..=10.0, -10.0..=10.0];
-        let solution = fit(&residual, 1, &[0.5, 0.5, 0.5, 0.5], &bounds, &*solver);
+        let solution = fit(&WOOD, 1, &[0.5, 0.5, 0.5, 0.5], &bounds, &*solver);
         let [bound] = &solution.outcome.active_bounds[..] else {
             panic!("{:?}", solution.outcome.active_bounds)
         };
         assert_eq!((bound.key.as_str(), bound.side, bound.value), ("x1", Side::Max, 0.8));
         let cost = |max: f64| {
             let bounds = [-10.0..=max, -10.0..=10.0, -10.0..=10.0, -10.0..=10.0];
-            fit(&residual, 1, &[0.5, 0.5, 0.5, 0.5], &bounds, &*solver).outcome.final_cost
+            fit(&WOOD, 1, &[0.5, 0.5, 0.5, 0.5], &bounds, &*solver).outcome.final_cost
         };
         // the multiplier is the decrease of the cost by a bound that is relaxed
         let decrease = (cost(0.8 - 1e-4) - cost(0.8 + 1e-4)) / 2e-4;

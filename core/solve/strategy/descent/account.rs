@@ -32,12 +32,12 @@ impl Descent<'_> {
         self.account(termination, open)
     }
 
-    /// Returns whether the estimate violates constraints that nothing drives to zero: a descent alone takes them as
-    /// factors.
+    /// Returns whether the estimate violates constraints. A descent without the method of multipliers takes them as
+    /// ordinary factors.
     fn violates_constraints(&self) -> bool {
         let constraints = &self.problem.constraints;
         !constraints.is_empty()
-            && !constraints.are_driven()
+            && !constraints.have_penalty()
             && self.problem.violation() > CONSTRAINT_TOLERANCE
     }
 

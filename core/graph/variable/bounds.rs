@@ -1,5 +1,4 @@
 //! Bounds: intervals for coordinates of variables.
-use crate::graph::GraphError;
 use crate::variable::{Key, Variable};
 use indexmap::IndexMap;
 use schemars::JsonSchema;
@@ -180,22 +179,6 @@ impl Bounds {
             value,
             interval,
         })
-    }
-
-    /// Reports directions that cannot be bounded, and coordinates that are out of bounds.
-    pub(crate) fn check(&self, key: &Key, value: &dyn Variable, errors: &mut Vec<GraphError>) {
-        let tangent = value.erased().tangent();
-        for (direction, _) in self.iter() {
-            let (key, direction) = (key.clone(), direction.to_owned());
-            match tangent.iter().position(|name| *name == direction) {
-                None => errors.push(GraphError::UnknownDirection { key, direction, tangent }),
-                Some(index) if value.erased().coordinate(index).is_none() => {
-                    errors.push(GraphError::Unboundable { key, direction, found: value.typetag_name() });
-                }
-                Some(_) => {}
-            }
-        }
-        errors.extend(self.out_of_bounds(key, value).map(GraphError::OutOfBounds));
     }
 }
 
