@@ -32,7 +32,7 @@ def auto(*, stop: types.Stopping | None = None, linear: types.LinearSolver | Non
 
     None of this depends on the unit of the noise: covariances that are too small by a factor have no
     effect. If no start applies, the solver is Levenberg-Marquardt with almost no damping. Starts need the
-    graph, and the starts of a plugin are available once it is linked. A compiled problem alone (`descend`)
+    graph, and the starts of a plugin are available once it is linked. A graph with constraints is solved by `dogleg`. A compiled problem alone (`descend`)
     is therefore solved by damped steps from its current estimate.
 
     ```toml

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from typing import Any
 
 import manifactor as mf
 import numpy as np
@@ -11,7 +12,7 @@ optimize = pytest.importorskip("scipy.optimize")
 
 
 @mf.factor
-def decay(a: mf.Point1, b: mf.Point1, c: mf.Point1, x, y):
+def decay(a: mf.Point1, b: mf.Point1, c: mf.Point1, x: Any, y: Any) -> Any:
     return a * np.exp(-b * x) + c - y
 
 
@@ -74,12 +75,12 @@ def test_bounds_that_do_not_fit_are_errors() -> None:
 
 
 @mf.factor
-def on_circle(p: mf.Point2, radius):
+def on_circle(p: mf.Point2, radius: Any) -> Any:
     return p[0] ** 2 + p[1] ** 2 - radius**2
 
 
 @mf.batch(rows=1)
-def apart(p: mf.Point2, q: mf.Point2, distance):
+def apart(p: mf.Point2, q: mf.Point2, distance: Any) -> Any:
     return np.linalg.norm(q - p, axis=1) - distance
 
 
