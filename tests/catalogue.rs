@@ -262,5 +262,5 @@ fn the_example_of_a_literal_graph_is_one() {
     let text: String = example.lines().map(|line| line.trim_start_matches("///").to_owned() + "\n").collect();
     let document = Document::parse("read.rs", text, Format::Toml).unwrap();
     let (graph, values) = manifactor::config::read_graph(&document).unwrap();
-    assert_eq!((graph.factors().len(), values.len()), (3, 2));
+    assert_eq!((graph.factors().len(), values.len()), (3, 3));
 }

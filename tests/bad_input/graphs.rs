@@ -26,6 +26,13 @@ fn noise(name: &'static str, noise: &str) -> Case {
     change(name, "sigma = 0.1", noise)
 }
 
+/// The graph with bounds of `x1`, which is a pose or a point.
+fn bounds(name: &'static str, bounds: &str, of: &str) -> Case {
+    let pose = "value = { type = \"se2\", translation = [3.0, 1.0], angle = 0.4 }";
+    let value = if of == "se2" { pose } else { "value = { type = \"point2\", position = [3.0, 1.0] }" };
+    change(name, pose, &format!("{value}\nbounds = {bounds}"))
+}
+
 #[test]
 fn documents_that_cannot_be_read() {
     let cases = vec![
@@ -78,6 +85,12 @@ fn values_that_are_wrong() {
         change("no key", "key = \"x1\"", ""),
         change("unknown direction held", "fixed = true", "fixed = [\"z\"]"),
         change("held by a word", "fixed = true", "fixed = \"yes\""),
+        bounds("bounds of a pose", "{ x = { min = 0.0 } }", "se2"),
+        bounds("bounds of an unknown direction", "{ z = { min = 0.0 } }", "point2"),
+        bounds("bounds without a limit", "{ x = {} }", "point2"),
+        bounds("bounds in the wrong order", "{ x = { min = 2.0, max = 1.0 } }", "point2"),
+        bounds("bounds as an array", "{ x = [0.0, 1.0] }", "point2"),
+        bounds("value out of bounds", "{ x = { min = 3.5, max = 4.0 } }", "point2"),
         space("quaternion zero", "[0.0, 0.0, 0.0, 0.0]"),
         space("quaternion not of length one", "[0.0, 0.0, 0.0, 2.0]"),
         space("quaternion not a number", "[0.0, 0.0, 0.0, nan]"),
