@@ -25,11 +25,11 @@ pub trait Start: Debug + Send + Sync {
 }
 
 impl dyn Start + '_ {
-    /// Returns the initial values of a solve: those of [`start`](Self::start), moved into the bounds of their
+    /// Returns the initial values of a solve: those of [`start`](Start::start), moved into the bounds of their
     /// variables.
     ///
     /// # Errors
-    /// As [`start`](Self::start), or if one of `values` is out of its bounds.
+    /// As [`start`](Start::start), or if one of `values` is out of its bounds.
     pub fn initial_values(&self, graph: &Graph, values: &Values) -> Result<Values, StartError> {
         match graph.out_of_bounds(values) {
             Some(out) => Err(ValueError::from(out).into()),
