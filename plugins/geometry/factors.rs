@@ -24,7 +24,7 @@ pub use heading::Heading;
 pub use landmark::Landmark;
 pub use located::Located;
 pub use on_body::{OnBody, OnBodyError};
-pub use position::Position;
+pub use position::{ExternalPosition, Position};
 pub use prior::Prior;
 pub use range::Range;
 pub use scaled_between::ScaledBetween;

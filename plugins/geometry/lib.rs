@@ -27,8 +27,8 @@ pub use bundle::{
 };
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{
-    Bearing3, BearingRange2, BearingRange3, Between, ChordalBetween, ConstantVelocity, Heading, Landmark,
-    Located, OnBody, OnBodyError, Position, Prior, Range, ScaledBetween,
+    Bearing3, BearingRange2, BearingRange3, Between, ChordalBetween, ConstantVelocity, ExternalPosition,
+    Heading, Landmark, Located, OnBody, OnBodyError, Position, Prior, Range, ScaledBetween,
 };
 pub use groups::{
     AngleError, Coordinates, CoordinatesError, ImuBias, LieGroup, MatrixError, Point1, Point2, Point3, Rn,

@@ -1,6 +1,6 @@
 //! Contents of a recording: its topics, and what they can be used for.
 use crate::bag::{BagError, Ending, read};
-use crate::messages::{CAMERA_TYPE, DETECTION_TYPE, Header, IMU_TYPE, POSE_TYPES, TRANSFORM_TYPE};
+use crate::messages::{CAMERA_TYPE, DETECTION_TYPE, FIX_TYPE, Header, IMU_TYPE, POSE_TYPES, TRANSFORM_TYPE};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -48,6 +48,8 @@ pub enum Role {
     CameraInfo,
     /// Accelerations.
     Imu,
+    /// Positions by satellites.
+    Fixes,
     /// Transforms between frames.
     Transforms,
 }
@@ -59,6 +61,7 @@ impl Role {
             DETECTION_TYPE => Some(Self::Detections),
             CAMERA_TYPE => Some(Self::CameraInfo),
             IMU_TYPE => Some(Self::Imu),
+            FIX_TYPE => Some(Self::Fixes),
             TRANSFORM_TYPE => Some(Self::Transforms),
             other => POSE_TYPES.contains(&other).then_some(Self::Odometry),
         }
@@ -71,6 +74,7 @@ impl Role {
             Self::Detections => &[DETECTION_TYPE],
             Self::CameraInfo => &[CAMERA_TYPE],
             Self::Imu => &[IMU_TYPE],
+            Self::Fixes => &[FIX_TYPE],
             Self::Transforms => &[TRANSFORM_TYPE],
         }
     }

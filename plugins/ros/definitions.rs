@@ -17,6 +17,7 @@ macro_rules! definition {
             "===\nMSG: geometry_msgs/Transform\nVector3 translation\nQuaternion rotation\n",
             "===\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n",
             "===\nMSG: sensor_msgs/RegionOfInterest\nuint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n",
+            "===\nMSG: sensor_msgs/NavSatStatus\nint8 status\nuint16 service\n",
             "===\nMSG: vision_msgs/Detection2D\nstd_msgs/Header header\nObjectHypothesisWithPose[] results\nBoundingBox2D bbox\nstring id\n",
             "===\nMSG: vision_msgs/ObjectHypothesisWithPose\nObjectHypothesis hypothesis\ngeometry_msgs/PoseWithCovariance pose\n",
             "===\nMSG: vision_msgs/ObjectHypothesis\nstring class_id\nfloat64 score\n",
@@ -49,6 +50,11 @@ pub(crate) const IMU: &str = definition!(
      geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n\
      geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance"
 );
+/// `sensor_msgs/msg/NavSatFix`.
+pub(crate) const FIX: &str = definition!(
+    "std_msgs/Header header\nNavSatStatus status\nfloat64 latitude\nfloat64 longitude\nfloat64 altitude\n\
+     float64[9] position_covariance\nuint8 position_covariance_type"
+);
 /// `vision_msgs/msg/Detection2DArray` of ROS 2 Humble and later.
 pub(crate) const DETECTIONS: &str = definition!("std_msgs/Header header\nDetection2D[] detections");
 
@@ -61,6 +67,7 @@ pub(crate) fn of(message_type: &str) -> Option<&'static str> {
         "tf2_msgs/msg/TFMessage" => TRANSFORMS,
         "sensor_msgs/msg/CameraInfo" => CAMERA_INFO,
         "sensor_msgs/msg/Imu" => IMU,
+        "sensor_msgs/msg/NavSatFix" => FIX,
         "vision_msgs/msg/Detection2DArray" => DETECTIONS,
         _ => return None,
     })

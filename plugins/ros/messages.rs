@@ -1,7 +1,7 @@
 //! Types of messages, with the fields that are used. Names of fields are those of ROS 2.
 use crate::{BagMessage, DecodeError};
 use manifactor_geometry::{RotationError, Se3, So3};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 
 /// Time of a message.
@@ -130,6 +130,8 @@ pub const POSE_TYPES: [&str; 3] =
 pub const TRANSFORM_TYPE: &str = "tf2_msgs/msg/TFMessage";
 /// Type of messages of an IMU.
 pub const IMU_TYPE: &str = "sensor_msgs/msg/Imu";
+/// Type of messages with a position by satellites.
+pub const FIX_TYPE: &str = "sensor_msgs/msg/NavSatFix";
 /// Type of messages with boxes.
 pub const DETECTION_TYPE: &str = "vision_msgs/msg/Detection2DArray";
 /// Type of messages with the calibration of a camera.
@@ -210,6 +212,53 @@ impl Imu {
         let acceleration = Vector3::new(x, y, z);
         let is_finite = acceleration.iter().all(|x| x.is_finite());
         is_finite.then_some(acceleration).ok_or("the acceleration is not finite")
+    }
+}
+
+/// `sensor_msgs/msg/NavSatFix`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct NavSatFix {
+    /// Time, and name of the frame of the antenna.
+    pub header: Header,
+    status: NavSatStatus,
+    // numbers that are not finite are decoded as none
+    latitude: Option<f64>,
+    longitude: Option<f64>,
+    /// Height above the ellipsoid of WGS 84, if it is known. Unit: metres.
+    pub altitude: Option<f64>,
+    position_covariance: Vec<Option<f64>>,
+    position_covariance_type: u8,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct NavSatStatus {
+    status: i8,
+}
+
+impl NavSatFix {
+    /// Returns the latitude, positive to the north, and the longitude, positive to the east, in degrees.
+    ///
+    /// # Errors
+    /// If the receiver has no position.
+    pub fn latitude_longitude(&self) -> Result<[f64; 2], &'static str> {
+        // by the definition of the message
+        if self.status.status < 0 {
+            return Err("the receiver has no position: its status is negative");
+        }
+        match (self.latitude, self.longitude) {
+            (Some(latitude), Some(longitude)) if latitude.abs() <= 90.0 && longitude.abs() <= 360.0 => {
+                Ok([latitude, longitude])
+            }
+            _ => Err("expected a latitude from -90 to 90 and a longitude from -360 to 360 degrees"),
+        }
+    }
+
+    /// Returns the covariance of the position to the east, to the north and upwards, in m²; `None` if the receiver
+    /// does not know it.
+    pub fn covariance(&self) -> Option<Matrix3<f64>> {
+        let numbers: Vec<f64> = self.position_covariance.iter().copied().collect::<Option<_>>()?;
+        let is_known = self.position_covariance_type != 0 && numbers.len() == 9;
+        is_known.then(|| Matrix3::from_row_slice(&numbers))
     }
 }
 

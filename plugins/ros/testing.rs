@@ -23,6 +23,8 @@ pub const TRANSFORMS: MessageType = ("tf2_msgs/msg/TFMessage", definitions::TRAN
 pub const CAMERA_INFO: MessageType = ("sensor_msgs/msg/CameraInfo", definitions::CAMERA_INFO);
 /// Accelerations.
 pub const IMU: MessageType = ("sensor_msgs/msg/Imu", definitions::IMU);
+/// Positions by satellites.
+pub const FIX: MessageType = ("sensor_msgs/msg/NavSatFix", definitions::FIX);
 /// Boxes.
 pub const DETECTIONS: MessageType = ("vision_msgs/msg/Detection2DArray", definitions::DETECTIONS);
 
@@ -45,6 +47,10 @@ impl Cdr {
     /// Appends a byte.
     pub fn u8(self, x: u8) -> Self {
         self.put(&[x])
+    }
+    /// Appends a number.
+    pub fn u16(self, x: u16) -> Self {
+        self.put(&x.to_le_bytes())
     }
     /// Appends a number.
     pub fn u32(self, x: u32) -> Self {
@@ -114,6 +120,14 @@ pub fn imu_message(seconds: f64, frame: &str, acceleration: [f64; 3]) -> Vec<u8>
     // orientation and angular velocity with their covariances
     let cdr = [0.0; 4 + 9 + 3 + 9].into_iter().fold(cdr, Cdr::f64);
     acceleration.into_iter().chain([0.0; 9]).fold(cdr, Cdr::f64).bytes()
+}
+
+/// Returns a [`FIX`] message with latitude, longitude and altitude, and a standard deviation, if it is known.
+pub fn fix_message(seconds: f64, frame: &str, status: i8, at: [f64; 3], sigma: Option<f64>) -> Vec<u8> {
+    let cdr = header(Cdr::new(), seconds, frame).u8(status.to_le_bytes()[0]).u16(1);
+    let variance = sigma.map_or(0.0, |sigma| sigma * sigma);
+    let covariance = (0..9).map(|i| if i % 4 == 0 { variance } else { 0.0 });
+    at.into_iter().chain(covariance).fold(cdr, Cdr::f64).u8(u8::from(sigma.is_some())).bytes()
 }
 
 /// Returns a [`CAMERA_INFO`] message of a camera with fx, fy, cx, cy, its width and height, and its distortion.

@@ -39,6 +39,7 @@ impl SequenceSource for Nothing {
             up: Some(Direction::Z),
             accelerometer: vec![],
             ground_truth: None,
+            georeference: None,
             pose_factors: vec![],
             corrected_jumps: vec![],
             unused: vec![],

@@ -1,6 +1,6 @@
 //! Settings of the window.
 use manifactor_graph::checked::Positive;
-use manifactor_graph::{TypeName, Variable};
+use manifactor_graph::{Key, TypeName, Variable};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
@@ -15,6 +15,8 @@ pub struct Window {
     pub span: Span,
     /// Types whose variables always stay.
     pub keep: Vec<TypeName<dyn Variable>>,
+    /// Keys of variables that always stay.
+    pub keep_keys: Vec<Key>,
 }
 
 /// Length of a window.
@@ -45,6 +47,9 @@ struct WindowDocument {
     /// Names of types whose variables always stay, for example `"dual_quadric"`. Default: none.
     #[serde(default)]
     keep: Vec<TypeName<dyn Variable>>,
+    /// Keys of variables that always stay, for example `"enu_from_map"`. Default: none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    keep_keys: Vec<Key>,
 }
 
 /// A window with both `poses` and `seconds`, or with neither.
@@ -59,29 +64,31 @@ pub struct NotOneSpan {
 
 impl TryFrom<WindowDocument> for Window {
     type Error = NotOneSpan;
-    fn try_from(WindowDocument { poses, seconds, keep }: WindowDocument) -> Result<Self, NotOneSpan> {
+    fn try_from(
+        WindowDocument { poses, seconds, keep, keep_keys }: WindowDocument,
+    ) -> Result<Self, NotOneSpan> {
         let span = match (poses, seconds) {
             (Some(poses), None) => Span::Poses(poses),
             (None, Some(seconds)) => Span::Seconds(seconds),
             (poses, _) => return Err(NotOneSpan { both: poses.is_some() }),
         };
-        Ok(Self { span, keep })
+        Ok(Self { span, keep, keep_keys })
     }
 }
 
 impl From<Window> for WindowDocument {
-    fn from(Window { span, keep }: Window) -> Self {
+    fn from(Window { span, keep, keep_keys }: Window) -> Self {
         let (poses, seconds) = match span {
             Span::Poses(poses) => (Some(poses), None),
             Span::Seconds(seconds) => (None, Some(seconds)),
         };
-        Self { poses, seconds, keep }
+        Self { poses, seconds, keep, keep_keys }
     }
 }
 
 impl From<Span> for Window {
-    /// Returns a window that keeps no type.
+    /// Returns a window without variables that always stay.
     fn from(span: Span) -> Self {
-        Self { span, keep: vec![] }
+        Self { span, keep: vec![], keep_keys: vec![] }
     }
 }

@@ -171,7 +171,7 @@ fn variables_stay_if_their_linear_prior_overflows() {
 
 #[test]
 fn a_window_tries_again_what_could_not_leave() {
-    let window = Some(Window { span: Span::Poses(NonZeroUsize::MIN), keep: vec![] });
+    let window = Some(Window { span: Span::Poses(NonZeroUsize::MIN), keep: vec![], keep_keys: vec![] });
     let (mut smoother, ids) =
         pushed_close_to_overflow(SmootherSettings { window, ..never_linearized_anew() });
     assert_eq!(smoother.update().unwrap().not_marginalized[..], ["a".into(), "b".into()]);

@@ -46,8 +46,11 @@ pub(crate) fn change() -> impl Strategy<Value = Change> {
 
 pub(crate) fn window() -> impl Strategy<Value = Window> {
     let keep = prop_oneof![Just(vec![]), Just(vec![TypeName::new("toy_space").unwrap()])];
-    (1..6usize, keep)
-        .prop_map(|(poses, keep)| Window { span: Span::Poses(NonZeroUsize::new(poses).unwrap()), keep })
+    (1..6usize, keep).prop_map(|(poses, keep)| Window {
+        span: Span::Poses(NonZeroUsize::new(poses).unwrap()),
+        keep,
+        keep_keys: vec![],
+    })
 }
 
 pub(crate) fn outliers() -> impl Strategy<Value = Option<Outliers>> {

@@ -74,7 +74,8 @@ pub(crate) fn step(i: usize) -> (Graph, Values) {
 
 fn windowed(poses: usize, keep: &[&str]) -> Smoother {
     let keep = keep.iter().map(|name| TypeName::new(name).unwrap()).collect();
-    let window = Some(Window { span: Span::Poses(NonZeroUsize::new(poses).unwrap()), keep });
+    let window =
+        Some(Window { span: Span::Poses(NonZeroUsize::new(poses).unwrap()), keep, keep_keys: vec![] });
     Smoother::new(SmootherSettings { window, ..SmootherSettings::default() })
 }
 
@@ -148,8 +149,16 @@ fn what_is_marginalized_is_named_and_nothing_can_be_added_to_it() {
 }
 
 #[test]
-fn types_that_are_kept_never_leave() {
-    let mut smoother = windowed(3, &["toy_space"]);
+fn what_is_kept_never_leaves() {
+    let by_key =
+        Window { keep_keys: vec!["lamp".into()], ..Window::from(Span::Poses(NonZeroUsize::new(3).unwrap())) };
+    let by_key = SmootherSettings { window: Some(by_key), ..SmootherSettings::default() };
+    for smoother in [windowed(3, &["toy_space"]), Smoother::new(by_key)] {
+        the_lamp_stays(smoother);
+    }
+}
+
+fn the_lamp_stays(mut smoother: Smoother) {
     let mut values = Values::new();
     values.insert("lamp", crate::world::Space { at: [0.0; 3] });
     let mut graph = Graph::new();

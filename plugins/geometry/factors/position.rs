@@ -1,6 +1,6 @@
-//! Position of a pose, as GPS or a total station measures it: r = R l + t - z.
+//! Position of a pose, as GPS or a total station measures it: r = R l + t - z, in the map or in a frame of its own.
 use crate::groups::quarter_turn;
-use crate::{Coordinates, Se2, Se3};
+use crate::{Coordinates, Se2, Se3, So3};
 use manifactor_graph::prelude::*;
 
 /// A measurement of the position of an antenna on the pose.
@@ -73,10 +73,63 @@ impl Residual for Position<3> {
 }
 register_factor!("position_se3", Position<3>);
 
+/// An antenna on the pose is at `position` in an external frame: r = E (R l + t) - z.
+///
+/// E is the first variable, the pose of the map in the external frame, such as east, north and up of a satellite
+/// receiver, or the frame of a total station. The second variable is the pose, in the map. Three rows in metres, along the axes of
+/// the external frame. Three positions that are not on a line determine E; otherwise it needs a prior. Invariant to a new
+/// frame of the map. Source: as the GPS factors of GTSAM, with the frame as a variable.
+///
+/// ```toml
+/// [[factors]]
+/// keys = ["enu_from_map", "x0"]
+/// factor = { type = "external_position_se3", position = [1.0, 0.5, 0.0], lever_arm = [0.0, 0.0, 1.2] }
+/// noise = { sigma = 2.0 }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExternalPosition {
+    /// Measured position of the antenna in the external frame, in metres.
+    pub position: Coordinates<3>,
+    /// Position of the antenna in the frame of the pose, in metres. Default: the origin of that frame.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub lever_arm: Coordinates<3>,
+}
+
+impl Residual for ExternalPosition {
+    type Variables = (Se3, Se3);
+    type Dim = U3;
+    const ROWS: &'static [&'static str] = &["x", "y", "z"];
+
+    fn residual<T: Scalar>(&self, (external, x): Lifted<Self::Variables, T>) -> Vector3<T> {
+        external.act(&x.act(&self.lever_arm.lift())) - self.position.lift::<T>()
+    }
+    fn linearize(
+        &self,
+        (external, x): Refs<'_, Self::Variables>,
+        _: &[bool],
+        j: &mut Jacobians<Self>,
+    ) -> Vector3<f64> {
+        let (outer, inner) = (external.rotation.matrix(), x.rotation.matrix());
+        let antenna = x.act(&self.lever_arm);
+        j.0.fixed_columns_mut::<3>(0).copy_from(&(-outer * antenna.cross_matrix()));
+        j.0.fixed_columns_mut::<3>(3).copy_from(&outer);
+        let both = outer * inner;
+        j.1.fixed_columns_mut::<3>(0).copy_from(&(-both * self.lever_arm.cross_matrix()));
+        j.1.fixed_columns_mut::<3>(3).copy_from(&both);
+        external.act(&antenna) - *self.position
+    }
+}
+register_factor!("external_position_se3", ExternalPosition);
+register_invariance!(ExternalPosition, "a new frame of the map", |_, (external, x), random| {
+    let [a, b] = [(); 2].map(|()| Vector3::new(random(3.0), random(3.0), random(3.0)));
+    let new_from_map = Se3::new(So3::exp(&a), b);
+    (external.compose(&new_from_map.inverse()), new_from_map.compose(x))
+});
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::So3;
     use crate::testing::{any_se2, any_se3, any_so3};
     use manifactor_testing::strategies::vector;
     use manifactor_testing::{check, invariance_law, jacobian_laws};
@@ -95,6 +148,23 @@ mod tests {
     jacobian_laws! {
         jacobians_agree_in_the_plane: (any_position::<2>(), any_se2());
         jacobians_agree_in_space: (any_position::<3>(), any_se3());
+        jacobians_agree_in_an_external_frame: (any_external(), any_se3(), any_se3());
+    }
+
+    fn any_external() -> impl Strategy<Value = ExternalPosition> {
+        any_position::<3>()
+            .prop_map(|Position { position, lever_arm }| ExternalPosition { position, lever_arm })
+    }
+
+    #[test]
+    fn in_the_frame_of_the_map_an_external_position_is_a_position() {
+        check((any_external(), any_se3()), |(external, x)| {
+            let ExternalPosition { position, lever_arm } = external.clone();
+            let plain = Position { position, lever_arm };
+            let (a, b) = (external.residual::<f64>((Se3::identity(), x)), plain.residual::<f64>((x,)));
+            prop_assert!((a - b).norm() < 1e-12);
+            Ok(())
+        });
     }
 
     #[test]

@@ -116,6 +116,7 @@ pub(crate) mod tests {
             up: None,
             accelerometer: vec![],
             ground_truth: None,
+            georeference: None,
             pose_factors: vec![],
             corrected_jumps: vec![],
             unused: vec![],

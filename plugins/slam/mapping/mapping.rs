@@ -140,6 +140,9 @@ impl Mapping {
             let object = mapping.add_object(measured, decision, settings);
             mapping.objects.push(object);
         }
+        if let Some(place) = &sequence.georeference {
+            place.add_to(&mapping.frame.map_from_odometry, &mut mapping.graph, &mut mapping.values);
+        }
         settings.own.add_to(&mut mapping.graph, &mut mapping.values);
         let unused = mapping.add_pose_factors(sequence);
         mapping.add_warnings(sequence, &unused, settings);

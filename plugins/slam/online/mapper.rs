@@ -30,6 +30,7 @@ use manifactor_mapping::semantics::RuleError;
 use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::DualQuadric;
 use manifactor_recording::camera::Cameras;
+use manifactor_recording::georeference::{ENU_FROM_MAP, Georeference};
 use manifactor_recording::sequence::{Frame, ObjectId, Observation, Sequence, SequenceHeader};
 use manifactor_smoother::{ChangeError, FactorId, Smoother, UpdateError, UpdateReport};
 use manifactor_solve::Observer;
@@ -55,6 +56,7 @@ pub struct Mapper {
     cameras: Cameras,
     /// For the poses of the body in reports.
     camera_from_body: Option<Se3>,
+    georeference: Option<Georeference>,
     smoother: Smoother,
     up: UpEstimate,
     associator: Box<dyn Associator>,
@@ -137,10 +139,11 @@ impl Mapper {
         let mut online = settings.online.clone();
         if let Some(window) = &mut online.window {
             // only poses leave the window
-            let own = settings.own.values.iter().map(|(_, value)| value.typetag_name());
             let of_motion = settings.motion.lasting_types().iter().copied();
-            let kept = own.chain([manifold_name(TypeId::of::<DualQuadric>())]).chain(of_motion);
+            let kept = of_motion.chain([manifold_name(TypeId::of::<DualQuadric>())]);
             window.keep.extend(kept.filter_map(|name| TypeName::new(name).ok()));
+            let own = settings.own.values.iter().map(|(key, _)| key.clone());
+            window.keep_keys.extend(own.chain(opening.georeference.map(|_| ENU_FROM_MAP.into())));
         }
         let trusted = settings.prior_map.as_ref().filter(|prior| prior.start.is_some());
         let known = trusted.map(|prior| prior.inflated_map().objects).unwrap_or_default();
@@ -151,6 +154,7 @@ impl Mapper {
             .filter_map(|measured| Some((measured.id, ObjectState::of_prior_object(measured)?)));
         Self {
             cameras: opening.cameras.clone(),
+            georeference: opening.georeference,
             camera_from_body: opening.body_from_camera.map(|pose| pose.inverse()),
             smoother: Smoother::new(online),
             associator: settings.association.create_associator(&settings.aliases, &known),

@@ -12,6 +12,7 @@ pub mod camera;
 pub mod class;
 pub mod ellipse;
 pub mod fusion;
+pub mod georeference;
 pub mod keys;
 pub mod measurement;
 pub mod prior_map;

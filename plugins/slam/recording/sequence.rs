@@ -5,6 +5,7 @@
 //! image x points right and y down.
 use crate::camera::{Cameras, MountedCamera};
 use crate::ellipse::ImageEllipse;
+use crate::georeference::Georeference;
 use crate::measurement::Quantities;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -37,6 +38,8 @@ pub struct Sequence {
     pub detections: Vec<Detection>,
     /// Up direction in the odometry frame, if the source knows it.
     pub up: Option<Direction>,
+    /// Place of the odometry on the Earth, if the source knows it.
+    pub georeference: Option<Georeference>,
     /// Readings of an accelerometer, if there is one.
     pub accelerometer: Vec<Acceleration>,
     /// Ground truth to compare the estimate with.
@@ -135,6 +138,8 @@ pub struct SequenceHeader {
     pub body_from_camera: Option<Se3>,
     /// Up direction in the odometry frame, if the source knows it.
     pub up: Option<Direction>,
+    /// Place of the odometry on the Earth, if the source knows it.
+    pub georeference: Option<Georeference>,
     /// Ground truth to compare the estimate with.
     pub ground_truth: Option<GroundTruth>,
 }
@@ -157,18 +162,25 @@ pub struct Observation {
 impl SequenceHeader {
     /// Creates an opening with only the cameras.
     pub fn new(cameras: impl Into<Cameras>) -> Self {
-        Self { cameras: cameras.into(), body_from_camera: None, up: None, ground_truth: None }
+        Self {
+            cameras: cameras.into(),
+            body_from_camera: None,
+            up: None,
+            georeference: None,
+            ground_truth: None,
+        }
     }
 
     /// Converts the opening to a sequence without frames.
     pub fn into_sequence(self) -> Sequence {
-        let Self { cameras, body_from_camera, up, ground_truth } = self;
+        let Self { cameras, body_from_camera, up, georeference, ground_truth } = self;
         Sequence {
             cameras,
             body_from_camera,
             frames: vec![],
             detections: vec![],
             up,
+            georeference,
             accelerometer: vec![],
             ground_truth,
             pose_factors: vec![],
@@ -191,6 +203,7 @@ impl Sequence {
             cameras: self.cameras.clone(),
             body_from_camera: self.body_from_camera,
             up: self.up,
+            georeference: self.georeference,
             ground_truth: self.ground_truth.clone(),
         }
     }

@@ -180,6 +180,7 @@ impl SimulatedSource {
             up: Some(Direction::Z),
             accelerometer: readings.unwrap_or_default(),
             ground_truth: Some(truth),
+            georeference: None,
             pose_factors: vec![],
             corrected_jumps: vec![],
             unused: vec![],

@@ -93,18 +93,19 @@ impl Schedule {
         }
     }
 
-    /// Adds a variable to the window, unless its type always stays.
+    /// Adds a variable to the window, unless it always stays.
     pub(in crate::smoother) fn add_to_window(&mut self, model: &Model, variable: u32, time: f64) {
         if self.leaves(model, variable) {
             self.window.held.push_back(WindowVariable { variable, rank: model.record(variable).rank, time });
         }
     }
 
-    /// Returns whether a variable has a type that leaves the window.
+    /// Returns whether a variable leaves the window.
     fn leaves(&self, model: &Model, variable: u32) -> bool {
         let Some(window) = &self.settings.window else { return false };
         let name = model.point(variable).map_or("", |point| point.typetag_name());
-        !window.keep.iter().any(|keep| keep.as_str() == name)
+        let key = &model.record(variable).key;
+        !window.keep.iter().any(|keep| keep.as_str() == name) && !window.keep_keys.contains(key)
     }
 
     /// Returns the variables to marginalize at the end of an update: the variables of `asked`, and the ones

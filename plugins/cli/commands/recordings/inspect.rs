@@ -48,6 +48,7 @@ impl Inspect {
             let role = role.or(match topic.role {
                 Some(Role::Transforms) => Some("transforms"),
                 Some(Role::Imu) => Some("imu"),
+                Some(Role::Fixes) => Some("fixes"),
                 _ => None,
             });
             table.row([

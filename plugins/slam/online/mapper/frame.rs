@@ -239,6 +239,9 @@ impl Mapper {
                 self.check_rules(map.up)?;
                 let first = map.map_from_odometry.compose(&frame.world_from_camera);
                 graph.push(prior_entry(first, &self.settings));
+                if let Some(place) = &self.georeference {
+                    place.add_to(&map.map_from_odometry, &mut graph, &mut values);
+                }
                 self.settings.own.add_to(&mut graph, &mut values);
                 for known in self.measurements.objects.iter().filter_map(|measured| measured.prior.as_ref()) {
                     graph.push(prior_object_entry(known, &self.settings));

@@ -179,6 +179,7 @@ impl JsonLines {
             cameras: cameras.clone(),
             body_from_camera: self.body_from_camera,
             up: self.up,
+            georeference: None,
             ground_truth,
         };
         let needs_pose = self.max_pose_gap.is_none();

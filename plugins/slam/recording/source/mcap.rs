@@ -1,20 +1,22 @@
 use super::assemble::{
     MatchedDetections, TimeMatching, default_share, is_default_share, match_by_time, read_ground_truth,
 };
-use super::camera::{CameraChoice, with_distortion};
+use super::camera::CameraChoice;
 use super::extrinsics::Extrinsics;
 use super::rectification::Rectification;
 use super::rig::Rig;
 use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
 use crate::camera::{Cameras, MountedCamera};
 use crate::sequence::{Acceleration, ClassScores, Detection, Sequence, UnusedInput};
+use calibration::camera_of;
+use fixes::FixedOdometry;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::{Direction, register};
-use manifactor_quadric::{BoundingBox, Camera};
-use manifactor_ros::messages::CameraInfo;
-use manifactor_ros::{Contents, Role};
+use manifactor_quadric::BoundingBox;
+use manifactor_ros::{Contents, Role, TransformError};
+use nalgebra::Vector3;
 use recorded_messages::{BoxesOfImage, Calibration, RecordedMessages};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,10 +24,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+mod calibration;
 mod error;
+mod fixes;
 mod recorded_messages;
 
 pub use error::McapError;
+pub use fixes::McapFixes;
 
 /// A recording of a robot that runs ROS 2, in MCAP or SQLite (db3).
 ///
@@ -61,6 +66,9 @@ pub struct Mcap {
     /// Default: the only topic of its type.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub imu: Option<String>,
+    /// Positions by satellites. Without this table they are not used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fixes: Option<McapFixes>,
     /// The camera in place of a topic.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraChoice>,
@@ -138,6 +146,7 @@ impl SequenceSource for Mcap {
         let lens = self.lens(&file, self.camera.as_ref(), messages.calibrations.first(), folders)?;
         let (poses, body_from_camera) = self.camera_poses(&file, &mut messages)?;
         let accelerometer = self.accelerometer(&file, &mut messages, body_from_camera)?;
+        let antenna = self.antenna(&file, &messages, body_from_camera)?;
         if let (Some(pose), Some(truth)) = (body_from_camera, &mut ground_truth) {
             Extrinsics::new(pose).apply_to_ground_truth(truth);
         }
@@ -163,6 +172,15 @@ impl SequenceSource for Mcap {
             match_by_time(&poses, images, rows, by, from)?;
         rig.apply(&mut detections)?;
         unused.extend(without);
+        let (mut georeference, mut pose_factors) = (None, vec![]);
+        if let (Some(settings), Some(antenna)) = (&self.fixes, antenna) {
+            let max_gap = self.max_pose_gap.get();
+            let odometry = FixedOdometry { poses: &poses, frames: &frames, max_gap, up: self.up };
+            match fixes::georeference(&messages.fixes, settings, &antenna, &odometry, &mut messages.unused) {
+                Ok((place, factors)) => (georeference, pose_factors) = (Some(place), factors),
+                Err(why) => messages.unused.push(format!("the positions by satellites are not used: {why}")),
+            }
+        }
         unused.extend(messages.unused.into_iter().map(UnusedInput::Recording));
         Ok(Sequence {
             cameras: rig.cameras,
@@ -170,9 +188,10 @@ impl SequenceSource for Mcap {
             frames,
             detections,
             up: self.up,
+            georeference,
             accelerometer,
             ground_truth,
-            pose_factors: vec![],
+            pose_factors,
             corrected_jumps: vec![],
             unused,
         })
@@ -375,16 +394,7 @@ impl Mcap {
         body_from_camera: Option<Se3>,
     ) -> Result<Vec<Acceleration>, McapError> {
         let Some(sensor) = messages.imu_frame.clone() else { return Ok(vec![]) };
-        let rotation = || match (self.body_from_camera, messages.camera_frame.as_deref()) {
-            (None, Some(camera)) => messages.transforms.pose(camera, &sensor, 0.0),
-            _ => {
-                let body = self.body_frame.as_deref().or(messages.body_frame.as_deref()).unwrap_or(&sensor);
-                let body_from_sensor = messages.transforms.pose(body, &sensor, 0.0)?;
-                Ok(body_from_camera
-                    .map_or(body_from_sensor, |camera| camera.inverse().compose(&body_from_sensor)))
-            }
-        };
-        match rotation() {
+        match self.camera_from_sensor(messages, body_from_camera, &sensor) {
             Ok(camera_from_sensor) => {
                 let mut readings = std::mem::take(&mut messages.accelerometer);
                 for reading in &mut readings {
@@ -402,6 +412,45 @@ impl Mcap {
                 Ok(vec![])
             }
         }
+    }
+
+    /// Returns the pose of a sensor in the frame of the camera.
+    fn camera_from_sensor(
+        &self,
+        messages: &RecordedMessages,
+        body_from_camera: Option<Se3>,
+        sensor: &str,
+    ) -> Result<Se3, TransformError> {
+        if let (None, Some(camera)) = (self.body_from_camera, messages.camera_frame.as_deref()) {
+            return messages.transforms.pose(camera, sensor, 0.0);
+        }
+        let body = self.body_frame.as_deref().or(messages.body_frame.as_deref()).unwrap_or(sensor);
+        let body_from_sensor = messages.transforms.pose(body, sensor, 0.0)?;
+        Ok(body_from_camera.map_or(body_from_sensor, |camera| camera.inverse().compose(&body_from_sensor)))
+    }
+
+    /// Returns the position of the satellite receiver's antenna in the frame of the camera; `None` without a receiver.
+    fn antenna(
+        &self,
+        file: &Path,
+        messages: &RecordedMessages,
+        body_from_camera: Option<Se3>,
+    ) -> Result<Option<Vector3<f64>>, McapError> {
+        let Some(settings) = &self.fixes else { return Ok(None) };
+        let body = self.body_frame.as_deref().or(messages.body_frame.as_deref()).unwrap_or_default();
+        let frame = match (&settings.antenna, &messages.antenna_frame) {
+            (Some(_), _) => body,
+            (None, Some(frame)) => frame,
+            // `georeference` reports that there is no position
+            (None, None) => return Ok(Some(Vector3::zeros())),
+        };
+        let place = self.camera_from_sensor(messages, body_from_camera, frame);
+        let no_place = |fault: TransformError| McapError::NoAntenna {
+            file: file.to_owned(),
+            fault: fault.to_string().into(),
+        };
+        let origin = settings.antenna.map_or(Vector3::zeros(), |antenna| antenna.vector());
+        Ok(Some(place.map_err(no_place)?.act(&origin)))
     }
 
     /// Returns the times of the images and their boxes, and boxes that cannot be used.
@@ -442,28 +491,6 @@ impl Mcap {
         let scores: ClassScores = scores.into_iter().map(|(class, score)| (name(class), score)).collect();
         Ok(Detection::new(camera.clone(), bounding_box, scores))
     }
-}
-
-/// Returns the camera of a calibration, and its distortion unless the images are rectified.
-fn camera_of(info: &CameraInfo, is_rectified: bool) -> Result<Rectification, String> {
-    let CameraInfo { height, width, distortion_model, d, k, p, .. } = info;
-    let (name, matrix) = if is_rectified { ("p", p) } else { ("k", k) };
-    let row = if is_rectified { 4 } else { 3 };
-    if matrix.len() != 3 * row {
-        return Err(format!("expected {} numbers in `{name}`, got {}", 3 * row, matrix.len()));
-    }
-    let numbers = [matrix[0], matrix[row + 1], matrix[2], matrix[row + 2]];
-    if numbers[0] == 0.0 {
-        return Err("the camera is not calibrated: its focal length is 0".into());
-    }
-    let camera = Camera::new(numbers, *width, *height).map_err(|error| error.to_string())?;
-    if is_rectified || d.iter().all(|coefficient| *coefficient == 0.0) {
-        return Ok(Rectification::of_pinhole(camera, None));
-    }
-    let hint = "for boxes in the rectified image set `source.rectified = true`";
-    with_distortion(camera, distortion_model, d)
-        .map(Rectification::of_model)
-        .map_err(|fault| format!("{fault}; {hint}"))
 }
 
 #[cfg(test)]

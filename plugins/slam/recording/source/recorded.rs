@@ -131,6 +131,7 @@ impl SequenceSource for RecordedFiles {
             up: self.up,
             accelerometer: vec![],
             ground_truth: truth,
+            georeference: None,
             pose_factors: vec![],
             corrected_jumps: vec![],
             unused,

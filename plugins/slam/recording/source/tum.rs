@@ -95,6 +95,7 @@ impl SequenceSource for TumRgbd {
             up: None,
             accelerometer: readings.into_iter().map(reading).collect(),
             ground_truth: truth,
+            georeference: None,
             pose_factors: vec![],
             corrected_jumps: vec![],
             unused,

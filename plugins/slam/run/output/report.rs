@@ -1,11 +1,13 @@
 //! Report of a run, for scripts and for people.
 use crate::output::map::gone_objects;
+use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
 use manifactor_mapping::estimate::variance::{MotionChoice, VarianceComponents};
 use manifactor_mapping::estimate::{CompletionOutcome, Estimate, LandmarkEstimate};
 use manifactor_mapping::mapping::{MappedObject, Rejection, Warning};
 use manifactor_mapping::settings::RunSettings;
 use manifactor_quadric::{DualQuadric, LandmarkError};
+use manifactor_recording::georeference::{ENU_FROM_MAP, Geodetic};
 use manifactor_recording::sequence::ObjectId;
 use manifactor_solve::{Diagnosis, Outcome, RejectedFactor, Termination, Times};
 use serde::Serialize;
@@ -59,6 +61,9 @@ pub struct VariantReport {
     pub counts: RunCounts,
     /// Up direction in the map frame, if known.
     pub up: Option<Direction>,
+    /// Place of the map on the Earth, if the source knows it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub georeference: Option<GeoreferenceReport>,
     /// Estimated noise of each round.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub variance_components: Vec<VarianceComponents>,
@@ -96,6 +101,22 @@ pub struct VariantReport {
     pub warnings: Vec<Warning>,
     /// Duration of reading, mapping, solving and evaluating. Unit: seconds.
     pub seconds: f64,
+}
+
+/// Place of the map on the Earth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct GeoreferenceReport {
+    /// Origin of the frame with the axes east, north and up.
+    pub origin: Geodetic,
+    /// Pose of the map in this frame.
+    pub enu_from_map: Se3,
+}
+
+impl GeoreferenceReport {
+    fn new(estimate: &Estimate) -> Option<Self> {
+        let origin = estimate.sequence.georeference?.origin;
+        Some(Self { origin, enu_from_map: *estimate.solution.values.get(ENU_FROM_MAP).ok()? })
+    }
 }
 
 /// Numbers of frames, boxes, objects and factors.
@@ -201,6 +222,7 @@ impl VariantReport {
             fingerprint: settings.fingerprint(),
             counts: RunCounts::of(estimate),
             up: mapping.frame.up,
+            georeference: GeoreferenceReport::new(estimate),
             variance_components: estimate.components.clone(),
             association: None,
             prior_map: None,

@@ -84,6 +84,14 @@ pub enum McapError {
         /// The reason.
         fault: Box<str>,
     },
+    /// The position of the satellite receiver's antenna is not known.
+    #[error("{}: the position of the antenna is not known: {fault}; `source.fixes.antenna` can give it", file.display())]
+    NoAntenna {
+        /// The recording.
+        file: PathBuf,
+        /// The reason.
+        fault: Box<str>,
+    },
     /// A further camera shares its topic of boxes, but does not say which frame is its own.
     #[error("{}: `source.cameras.{camera}` shares the topic `{topic}` with another camera: set its `camera_frame`", file.display())]
     SharedTopic {

@@ -1,9 +1,12 @@
 //! Messages of a recording that a sequence is made of.
+use super::fixes::Fix;
 use super::{CameraChoice, FurtherMcapCamera, Mcap, McapError};
 use crate::sequence::Acceleration;
 use manifactor_formats::tum::StampedPose;
 use manifactor_graph::Manifold;
-use manifactor_ros::messages::{CameraInfo, Detection2D, Detection2DArray, FramedPose, Imu, TransformList};
+use manifactor_ros::messages::{
+    CameraInfo, Detection2D, Detection2DArray, FramedPose, Imu, NavSatFix, TransformList,
+};
 use manifactor_ros::{BagMessage, Contents, DecodeError, Ending, Role, Transforms, read};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -60,6 +63,10 @@ pub(super) struct RecordedMessages {
     /// Frame of the IMU, if there are readings.
     pub imu_frame: Option<String>,
     imu_topic: Option<String>,
+    pub fixes: Vec<Fix>,
+    /// Frame of the antenna, if there are positions.
+    pub antenna_frame: Option<String>,
+    fix_topic: Option<String>,
     /// What is left out, with the number and the reason.
     pub unused: Vec<String>,
 }
@@ -136,6 +143,14 @@ impl RecordedMessages {
             (None, _) => None,
             (named, _) => Some(source.topic(file, &contents, Role::Imu, ("imu", named.as_ref()), "")?),
         };
+        found.fix_topic = match &source.fixes {
+            Some(fixes) => {
+                let named = ("fixes.topic", fixes.topic.as_ref());
+                let instead = "leave `source.fixes` out";
+                Some(source.topic(file, &contents, Role::Fixes, named, instead)?)
+            }
+            None => None,
+        };
         let mut unused = UnusedMessages::default();
         let ending = read(file, |message| {
             let name = &message.topic.name;
@@ -148,6 +163,8 @@ impl RecordedMessages {
                 found.add_boxes(&message)
             } else if found.imu_topic.as_ref() == Some(name) {
                 found.add_acceleration(&message)
+            } else if found.fix_topic.as_ref() == Some(name) {
+                found.add_fix(&message)
             } else {
                 found.add_calibration(&message)
             };
@@ -210,6 +227,13 @@ impl RecordedMessages {
         let (timestamp, acceleration) = (imu.header.stamp.seconds(), imu.acceleration()?);
         self.imu_frame.get_or_insert(imu.header.frame_id);
         self.accelerometer.push(Acceleration { timestamp, acceleration });
+        Ok(())
+    }
+
+    fn add_fix(&mut self, message: &BagMessage<'_>) -> Result<(), String> {
+        let fix: NavSatFix = message.decode().map_err(|error| text(&error))?;
+        self.fixes.push(Fix::of(&fix)?);
+        self.antenna_frame.get_or_insert(fix.header.frame_id);
         Ok(())
     }
 

@@ -1,32 +1,6 @@
 use super::*;
+use crate::georeference::Geodetic;
 use serde_json::json;
-
-fn info(model: &str, d: &[f64]) -> CameraInfo {
-    serde_json::from_value(json!({
-        "header": {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "camera"},
-        "height": 480, "width": 640, "distortion_model": model, "d": d,
-        "k": [500.0, 0.0, 320.0, 0.0, 510.0, 240.0, 0.0, 0.0, 1.0],
-        "p": [480.0, 0.0, 310.0, 0.0, 0.0, 490.0, 230.0, 0.0, 0.0, 0.0, 1.0, 0.0],
-    }))
-    .unwrap()
-}
-
-#[test]
-fn a_calibration_gives_the_camera_of_the_image() {
-    let lens = camera_of(&info("plumb_bob", &[0.1, 0.0, 0.0, 0.0]), false).unwrap();
-    assert_eq!((lens.camera.fx, lens.camera.cy), (500.0, 240.0));
-    let rectified = camera_of(&info("equidistant", &[0.1; 4]), true).unwrap().camera;
-    assert_eq!((rectified.fx, rectified.fy, rectified.cx, rectified.cy), (480.0, 490.0, 310.0, 230.0));
-    assert!(camera_of(&info("equidistant", &[0.0; 4]), false).is_ok());
-    assert!(camera_of(&info("equidistant", &[0.1; 4]), false).is_ok());
-    assert!(camera_of(&info("rational_polynomial", &[0.01; 8]), false).is_ok());
-    let fault = camera_of(&info("fov", &[0.9]), false).unwrap_err();
-    assert!(fault.contains("got `fov`") && fault.contains("source.rectified"), "{fault}");
-    let fault = camera_of(&info("plumb_bob", &[0.1; 3]), false).unwrap_err();
-    assert!(fault.contains("expected 4, 5 or 8"), "{fault}");
-    let uncalibrated = CameraInfo { k: vec![0.0; 9], ..info("", &[]) };
-    assert!(camera_of(&uncalibrated, false).unwrap_err().contains("not calibrated"));
-}
 
 #[test]
 fn classes_by_number_get_their_names_and_faulty_boxes_are_reported() {
@@ -40,7 +14,7 @@ fn classes_by_number_get_their_names_and_faulty_boxes_are_reported() {
         Ok((good, vec![("1".to_owned(), 70.0)])),
         Err("no centre".to_owned()),
     ];
-    let camera = camera_of(&info("plumb_bob", &[]), true).unwrap().camera;
+    let camera = manifactor_quadric::Camera::new([500.0, 510.0, 320.0, 240.0], 640, 480).unwrap();
     let cameras = crate::camera::Cameras::new(camera);
     let (images, rows, unused) = source.detections(&[image(boxes), image(vec![])], &cameras);
     assert_eq!((images.len(), rows.len(), unused.len()), (2, 1, 3));
@@ -57,7 +31,8 @@ mod recordings {
 
     type Message = (&'static str, f64, Vec<u8>);
 
-    const TOPICS: [(&str, MessageType); 9] = [
+    const TOPICS: [(&str, MessageType); 10] = [
+        ("/fix", FIX),
         ("/imu", IMU),
         ("/rear/detections", DETECTIONS),
         ("/rear/camera_info", CAMERA_INFO),
@@ -330,5 +305,133 @@ mod recordings {
             frame.world_from_camera.local(&expected).norm()
         });
         assert!(worst.fold(0.0, f64::max) < 1e-6);
+    }
+
+    fn antenna() -> Vector3<f64> {
+        Vector3::new(0.1, -0.3, 1.2)
+    }
+
+    const ORIGIN: Geodetic = Geodetic { latitude: 48.137, longitude: 11.575, altitude: 519.0 };
+
+    fn enu_from_odometry() -> Se3 {
+        Se3::exp(&Vector6::new(0.0, 0.0, 2.0, 0.0, 0.0, 0.0))
+    }
+
+    /// Position of the antenna to the east, to the north and upwards of its first one.
+    fn east_north_up(t: f64) -> Vector3<f64> {
+        let at = |t: f64| enu_from_odometry().act(&body(t).act(&antenna()));
+        at(t) - at(0.0)
+    }
+
+    fn geodetic(east_north_up: &Vector3<f64>) -> [f64; 3] {
+        let [degree, mut at] = [111_000.0, 0.0].map(|x| Vector3::new(x, x, x));
+        let shape = Vector3::new(degree.x * ORIGIN.latitude.to_radians().cos(), degree.y, 1.0);
+        let place = |at: &Vector3<f64>| Geodetic {
+            latitude: ORIGIN.latitude + at.y,
+            longitude: ORIGIN.longitude + at.x,
+            altitude: ORIGIN.altitude + at.z,
+        };
+        for _ in 0..20 {
+            at += (east_north_up - ORIGIN.east_north_up(&place(&at))).component_div(&shape);
+        }
+        let Geodetic { latitude, longitude, altitude } = place(&at);
+        [latitude, longitude, altitude]
+    }
+
+    /// Positions at 5 Hz, between the times of the poses.
+    fn fixes(sigma: Option<f64>) -> Vec<Message> {
+        let fix = |i: i32| {
+            let t = 0.2 * f64::from(i);
+            ("/fix", t, fix_message(100.0 + t, "gps", 0, geodetic(&east_north_up(t)), sigma))
+        };
+        (0..14).map(fix).collect()
+    }
+
+    fn antenna_transform() -> Message {
+        let place = Se3::new(So3::identity(), antenna());
+        ("/tf_static", 0.0, transform_message(0.0, "base_link", "gps", &place))
+    }
+
+    #[test]
+    fn positions_by_satellites_are_factors_on_the_nearest_images() {
+        let settings = [
+            json!({"fixes": {}, "up": [0.0, 0.0, 1.0]}),
+            json!({"fixes": {"topic": "/fix", "antenna": [0.1, -0.3, 1.2], "sigma": 0.02}}),
+        ];
+        for (settings, sigma) in settings.into_iter().zip([Some(0.02), None]) {
+            let all = messages().into_iter().chain([antenna_transform()]).chain(fixes(sigma));
+            let found = load(settings, all).unwrap();
+            let place = found.georeference.unwrap();
+            assert!((place.origin.latitude - ORIGIN.latitude).abs() < 1e-9);
+            let expected = Se3 { translation: -enu_from_odometry().act(&antenna()), ..enu_from_odometry() };
+            let away = place.enu_from_odometry.local(&expected).norm();
+            assert!(away < 1e-6, "{away}");
+            assert_eq!(found.pose_factors.len(), 14);
+            assert!(found.pose_factors.is_sorted_by_key(|(arrived, _)| *arrived));
+            for (arrived, factor) in &found.pose_factors {
+                let frame = &found.frames[*arrived];
+                let entry = factor.entry(&found.frames, None).unwrap();
+                let variables: [&dyn manifactor_graph::Variable; 2] = [&expected, &frame.world_from_camera];
+                let residual = entry.factor.evaluate(&variables).unwrap();
+                assert!(residual.amax() < 1e-6, "{residual}");
+            }
+        }
+    }
+
+    #[test]
+    fn positions_that_cannot_be_used_are_counted_with_the_remedy() {
+        let with = |settings: serde_json::Value, fixes: Vec<Message>| {
+            load(settings, messages().into_iter().chain([antenna_transform()]).chain(fixes)).unwrap()
+        };
+        let says = |found: &Sequence, words: &str| {
+            let has =
+                |unused: &UnusedInput| matches!(unused, UnusedInput::Recording(what) if what.contains(words));
+            assert!(found.unused.iter().any(has), "{words}: {:?}", found.unused);
+        };
+        let level = || json!({"fixes": {}, "up": [0.0, 0.0, 1.0]});
+        let mut mixed = fixes(Some(0.02));
+        let at = geodetic(&Vector3::zeros());
+        mixed.push(("/fix", 3.0, fix_message(100.5, "gps", -1, at, Some(0.02))));
+        mixed.push(("/fix", 3.0, fix_message(100.6, "gps", 0, [95.0, at[1], at[2]], Some(0.02))));
+        mixed.push(("/fix", 3.0, fix_message(300.0, "gps", 0, at, Some(0.02))));
+        mixed.push(("/fix", 3.0, fix_message(100.7, "gps", 0, at, None)));
+        let found = with(level(), mixed);
+        assert_eq!(found.pose_factors.len(), 14);
+        says(&found, "2 messages of `/fix` are left out: the receiver has no position");
+        says(
+            &found,
+            "1 of 16 positions by satellites are left out: the receiver does not know its covariance",
+        );
+        says(&found, "1 of 16 positions by satellites are left out: they are not between two poses");
+        for (settings, fixes, words) in [
+            (level(), fixes(None), "set `source.fixes.sigma`"),
+            (level(), fixes(Some(5.0)), "does not show the direction of a path"),
+            (json!({"fixes": {}}), fixes(Some(0.5)), "set `source.up`"),
+        ] {
+            let found = with(settings, fixes);
+            assert!(found.georeference.is_none() && found.pose_factors.is_empty());
+            says(&found, words);
+        }
+        let error = load(level(), messages().into_iter().chain(fixes(Some(0.1)))).unwrap_err().to_string();
+        assert!(error.contains("`source.fixes.antenna` can give it"), "{error}");
+        let error = load(level(), messages()).unwrap_err().to_string();
+        assert!(error.contains("sensor_msgs/msg/NavSatFix"), "{error}");
+    }
+
+    #[test]
+    fn a_position_without_altitude_has_two_rows() {
+        let flat = |message: Message| {
+            let t = message.1;
+            let [latitude, longitude, _] = geodetic(&east_north_up(t));
+            let at = [latitude, longitude, f64::NAN];
+            ("/fix", t, fix_message(100.0 + t, "gps", 0, at, Some(0.02)))
+        };
+        let all = fixes(None).into_iter().map(flat);
+        let settings = json!({"fixes": {}, "up": [0.0, 0.0, 1.0]});
+        let found = load(settings, messages().into_iter().chain([antenna_transform()]).chain(all)).unwrap();
+        let observed = |(_, factor): &(usize, crate::pose_graph::PoseFactor)| {
+            factor.noise.observed() == Some(&[true, true, false][..])
+        };
+        assert!(found.pose_factors.len() == 14 && found.pose_factors.iter().all(observed));
     }
 }
