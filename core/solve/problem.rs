@@ -82,6 +82,20 @@ impl Problem {
         place.start.map(|s| s..s + place.tangent.len())
     }
 
+    /// Returns the coordinate to which each scalar unknown adds; `None` for unknowns without one, such as rotations.
+    pub(crate) fn coordinates(&self) -> Vec<Option<f64>> {
+        let mut all = vec![None; self.dim()];
+        for place in &self.model.variables {
+            let column = self.model.columns().column(place.column);
+            for (direction, unknown) in place.unknowns().enumerate() {
+                if let Some(unknown) = unknown {
+                    all[unknown] = column.coordinate(place.index, direction);
+                }
+            }
+        }
+        all
+    }
+
     /// Computes H and g at the estimate, and decides which factors are active. If a value is not finite,
     /// the result names a factor that causes it.
     pub fn linearize(&mut self) -> Evaluation {

@@ -270,9 +270,9 @@ impl<'a> Descent<'a> {
             Some(termination)
         } else if self.interrupted {
             Some(Termination::Interrupted)
-        } else if self.at.cost <= *self.stop.absolute_cost * self.unit() {
+        } else if self.is_negligible(self.at.cost) {
             Some(Termination::Converged { reason: Tolerance::AbsoluteCost })
-        } else if gradient <= *self.stop.gradient * self.unit() {
+        } else if gradient <= *self.stop.gradient * self.unit() && !self.is_steep() {
             Some(Termination::Converged { reason: Tolerance::Gradient })
         } else if self.iterations >= self.stop.max_iterations {
             let settled = self.settled.clone().filter(|_| steps_become_shorter(&self.history));
@@ -295,6 +295,35 @@ impl<'a> Descent<'a> {
             largest if largest > 0.0 => largest.min(1.0),
             _ => 1.0,
         }
+    }
+
+    /// Returns whether a cost is zero up to rounding: within the absolute tolerance, also if values that are far below
+    /// one, such as currents in amperes, are counted in units of their own size.
+    fn is_negligible(&self, cost: f64) -> bool {
+        let limit = *self.stop.absolute_cost;
+        if cost > limit * self.unit() {
+            return false;
+        }
+        let coordinates = self.problem.coordinates();
+        let sizes = coordinates.iter().map(|x| x.map_or(1.0, |x| x.abs().min(1.0)));
+        let information = self.problem.system.diagonal().zip(sizes).map(|(d, size)| d * size * size);
+        cost <= limit * information.fold(0.0, f64::max).min(1.0)
+    }
+
+    /// Returns whether a step is within the tolerance, and changes no coordinate by more than a millionth of its value.
+    /// Coordinates that are zero up to rounding of the others do not count.
+    pub(crate) fn is_short(&self, step: &TrialStep) -> bool {
+        const SHARE: f64 = 1e-6;
+        const ROUNDING: f64 = 1e-15;
+        if step.norm > *self.stop.step {
+            return false;
+        }
+        let coordinates = self.problem.coordinates();
+        let largest = coordinates.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let changes = |(x, d): (&Option<f64>, &f64)| {
+            x.is_some_and(|x| x.abs() > ROUNDING * largest && d.abs() > SHARE * x.abs())
+        };
+        !coordinates.iter().zip(&step.delta).any(changes)
     }
 
     /// Returns the largest cosine between the residual vector and a column of the Jacobian. It is zero if
@@ -436,7 +465,7 @@ impl<'a> Descent<'a> {
         }
         let reason = if is_small {
             Tolerance::RelativeCost
-        } else if step.norm <= *self.stop.step {
+        } else if self.is_short(step) {
             Tolerance::Step
         } else {
             return None;

@@ -163,7 +163,7 @@ impl Dogleg {
                         return settled;
                     }
                 }
-                if step.norm <= *descent.stop.step {
+                if descent.is_short(&step) {
                     return match is_cut || descent.is_steep() {
                         true => descent.stalled_by(Stall::TrustRegion),
                         false => Termination::Converged { reason: Tolerance::Step },

@@ -205,7 +205,7 @@ impl LevenbergMarquardt {
                     let reason =
                         if !matches!(tried, TrialResult::Undefined) && descent.shows_no_decrease(&step) {
                             Some(Tolerance::RelativeCost)
-                        } else if step.norm <= *descent.stop.step && !descent.is_steep() {
+                        } else if descent.is_short(&step) && !descent.is_steep() {
                             Some(Tolerance::Step)
                         } else {
                             None

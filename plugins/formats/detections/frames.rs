@@ -115,11 +115,34 @@ impl Frames {
             })?;
             return Ok(if time > NANOSECONDS { 1e-9 * time } else { time });
         }
-        let digits = stem.rsplit(|c: char| !c.is_ascii_digit()).find(|digits| !digits.is_empty());
-        let number = digits.and_then(|digits| digits.parse().ok());
-        self.time(
-            number.ok_or_else(|| Mistake::Row(format!("the name of the image `{name}` has no number")))?,
-        )
+        self.time(number_of_name(without_export(stem)).map_err(|fault| {
+            Mistake::Row(format!("the name of the image `{name}` {fault}"))
+        })?)
+    }
+}
+
+/// Returns a name without what Roboflow appends: `frame_0012` for `frame_0012_jpg.rf.3f2c…`.
+fn without_export(stem: &str) -> &str {
+    let Some((exported, hash)) = stem.rsplit_once(".rf.") else { return stem };
+    if !hash.chars().all(|c| c.is_ascii_alphanumeric()) {
+        return stem;
+    }
+    exported.rsplit_once('_').map_or(exported, |(name, _extension)| name)
+}
+
+/// Returns the number of an image: the only one in its name, or the one with most digits, since numbers of images have
+/// leading zeros or become large.
+fn number_of_name(stem: &str) -> Result<u64, String> {
+    let numbers: Vec<&str> =
+        stem.split(|c: char| !c.is_ascii_digit()).filter(|digits| !digits.is_empty()).collect();
+    let most = numbers.iter().map(|digits| digits.len()).max().ok_or("has no number")?;
+    let longest: Vec<&str> = numbers.into_iter().filter(|digits| digits.len() == most).collect();
+    match longest[..] {
+        [only] => only.parse().map_err(|_| format!("has the number {only}, which is too large")),
+        _ => Err(format!(
+            "has several numbers, {}: expected one, or one with more digits than the others, such as `left2_0012.jpg`",
+            longest.join(" and ")
+        )),
     }
 }
 
@@ -143,6 +166,13 @@ mod tests {
         assert!(names.time_of_name("left.png").unwrap_err().to_string().contains("set `frames`"));
         let rate = Frames::Rate { rate: 10.0, start: 5.0, first: 1 };
         assert_eq!(rate.time_of_name("cam0/frame_000003.jpg").unwrap(), 5.2);
+        let exported = "frame_0007_jpg.rf.0d9c5b3f8e7a4421a1f3b5c7d9e0f102.jpg";
+        assert_eq!(rate.time_of_name(exported).unwrap(), 5.6);
+        assert_eq!(rate.time_of_name("frame_0003_left2.png").unwrap(), 5.2);
+        assert_eq!(rate.time_of_name("cam0_03.png").unwrap(), 5.2);
+        let several = rate.time_of_name("cam2_3.png").unwrap_err().to_string();
+        assert!(several.contains("has several numbers, 2 and 3"), "{several}");
+        assert!(rate.time_of_name("left.png").unwrap_err().to_string().contains("has no number"));
         assert!(rate.time(0).unwrap_err().to_string().contains("`frames.first`"));
         let list = Frames::List { times: vec![1.0, 2.0], first: 0, file: "times.txt".into() };
         assert_eq!(list.time(1).unwrap(), 2.0);

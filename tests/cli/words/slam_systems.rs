@@ -4,8 +4,8 @@ use crate::{fed, folder, manifactor, path};
 use manifactor::geometry::{Se3, So3};
 use manifactor::nalgebra::Vector3;
 use manifactor::slam::ros::testing::{
-    CAMERA_INFO, DETECTIONS, MessageType, ODOMETRY, TRANSFORMS, camera_message, database, detections_message,
-    odometry_message, recording, transform_message,
+    CAMERA_INFO, DETECTIONS, FIX, MessageType, ODOMETRY, TRANSFORMS, camera_message, database,
+    detections_message, fix_message, odometry_message, recording, transform_message,
 };
 use serde_json::Value;
 use std::path::Path;
@@ -227,6 +227,63 @@ fn a_jump_of_the_odometry_is_corrected() {
         // the desk has 18 objects; uncorrected, most are mapped twice
         let objects = variant["counts"]["objects"].as_u64().unwrap();
         assert!((12..=20).contains(&objects), "{command}: {objects} objects");
+    }
+}
+
+#[test]
+fn positions_by_satellites_correct_a_trajectory() {
+    let folder = folder(&[]);
+    let desk = path(&folder, "desk");
+    manifactor(&format!("simulate examples/desk/desk.toml --out {desk} --set source.trajectory.frames=80"))
+        .ended(0);
+    let truth = std::fs::read_to_string(format!("{desk}/groundtruth.txt")).unwrap();
+    let base_from_camera = base_from_camera();
+    let antenna = Vector3::new(0.3, 0.2, 1.4);
+    let (mut topics, mut messages) = messages(&frames(), &base_from_camera, None);
+    topics.push(("/gps/fix", FIX));
+    let enu_from_truth =
+        Se3::new(So3::from_quaternion_xyzw([0.0, 0.0, 0.6, 0.8]).unwrap(), Vector3::new(4.0, -7.0, 1.0));
+    let mut at_base = vec![];
+    for (i, line) in truth.lines().filter(|line| !line.starts_with('#')).enumerate() {
+        let numbers: Vec<f64> = line.split(' ').map(|number| number.parse().unwrap()).collect();
+        let [time, x, y, z, q @ ..] = numbers[..].try_into().map(|all: [f64; 8]| all).unwrap();
+        let camera = Se3::new(So3::from_quaternion_xyzw(q).unwrap(), Vector3::new(x, y, z));
+        let base = camera.compose(&base_from_camera.inverse());
+        let [x, y, z] = base.translation.into();
+        let [qx, qy, qz, qw] = base.rotation.quaternion_xyzw();
+        at_base.push(format!("{time} {x} {y} {z} {qx} {qy} {qz} {qw}"));
+        // metres per degree at 48° north
+        let place = enu_from_truth.act(&base.act(&antenna));
+        let degrees = [48.0 + place.y / 111_199.1, 11.0 + place.x / 74_631.2, 500.0 + place.z];
+        let noise = 0.005 * (12.9898 * i as f64).sin();
+        let degrees = [degrees[0] + noise / 111_199.1, degrees[1] - noise / 74_631.2, degrees[2] + noise];
+        messages.push(("/gps/fix", time, fix_message(time, "gps", 0, degrees, Some(0.01))));
+    }
+    let gps = Se3::new(So3::identity(), antenna);
+    messages.push(("/tf_static", 0.0, transform_message(0.0, "base_link", "gps", &gps)));
+    std::fs::write(path(&folder, "truth.txt"), at_base.join("\n")).unwrap();
+    std::fs::write(path(&folder, "drive.mcap"), recording(&topics, messages.into_iter())).unwrap();
+    let source = block("slam-systems.md", "toml", "drive.mcap");
+    let fixes = block("slam-systems.md", "toml", "source.fixes").replace("antenna = [", "# antenna = [");
+    let plain = format!("{source}ground_truth = \"truth.txt\"\n");
+    for (name, document) in [("without", plain.clone()), ("with", format!("{plain}{fixes}"))] {
+        std::fs::write(path(&folder, &format!("{name}.toml")), document).unwrap();
+    }
+    let report = |command: &str, name: &str| {
+        let out = path(&folder, &format!("{command}_{name}"));
+        manifactor(&format!("{command} {} --out {out}", path(&folder, &format!("{name}.toml")))).ended(0);
+        let text = std::fs::read_to_string(format!("{out}/report.json")).unwrap();
+        let report: Value = serde_json::from_str(&text).unwrap();
+        report["variants"][0].clone()
+    };
+    let error = |report: &Value| report["trajectory"][0]["estimate"]["ate"]["rmse"].as_f64().unwrap();
+    let without = error(&report("run", "without"));
+    for command in ["run", "online"] {
+        let with = report(command, "with");
+        assert!(error(&with) < 0.01 && error(&with) < 0.5 * without, "{} {without}", error(&with));
+        let place = &with["georeference"];
+        assert!((place["origin"]["latitude"].as_f64().unwrap() - 48.0).abs() < 1e-3, "{place}");
+        assert!(with["warnings"].as_array().unwrap().iter().all(|w| !w.to_string().contains("satellites")));
     }
 }
 
