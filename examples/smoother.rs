@@ -7,7 +7,7 @@ use manifactor::smoother::{Smoother, SmootherSettings, Span, Window};
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let window = Window { span: Span::Poses(20.try_into()?), keep: vec![] };
+    let window = Window::from(Span::Poses(20.try_into()?));
     let mut smoother =
         Smoother::new(SmootherSettings { window: Some(window), ..SmootherSettings::default() });
     let step = Se2::exp(&Vector3::new(1.0, 0.0, 0.1));

@@ -1,5 +1,6 @@
 //! Scales, offsets and weights at the limits of robotics: a solve returns the scaled answer, or the reason
 //! for its failure.
+use manifactor::config::{Document, Format, read_graph};
 use manifactor::geometry::{Between, Prior, Se2, Se3};
 use manifactor::prelude::*;
 use manifactor::solve::Auto;
@@ -111,4 +112,76 @@ proptest! {
         graph.add(["a", "b"], Between { relative });
         solved(&graph, &values);
     }
+}
+
+/// A fit of a decay to measurements, without noise, at times from 0 to 5.
+fn decay(scale: f64, tau: f64, residual: &str, start: [f64; 2], noise: &str) -> (Graph, Values) {
+    let mut text = format!(
+        "[[variables]]\nkey = \"a\"\nvalue = {{ type = \"point1\", position = [{:e}] }}\n\
+         [[variables]]\nkey = \"b\"\nvalue = {{ type = \"point1\", position = [{:e}] }}\n",
+        start[0], start[1]
+    );
+    for i in 0..11 {
+        let t = 0.5 * f64::from(i);
+        let measured = scale * (-t / tau).exp();
+        let residual = residual.replace('T', &format!("{t:.1}"));
+        text += &format!(
+            "[[factors]]\nkeys = [\"a\", \"b\"]\n{noise}\nfactor = {{ type = \"expression\", \
+             variables = {{ a = \"point1\", b = \"point1\" }}, residual = [\"{residual} - {measured:e}\"] }}\n"
+        );
+    }
+    let document = Document::parse("decay.toml", text, Format::Toml).unwrap();
+    read_graph(&document).unwrap()
+}
+
+fn number(values: &Values, key: &str) -> f64 {
+    values.get::<manifactor::geometry::Point1>(key).unwrap().x
+}
+
+#[test]
+fn values_in_small_units_are_fitted_as_others() {
+    // currents of 40 pA in amperes, and a capacity of 0.47 pF in farads
+    let current = decay(4e-11, 1.7, "a*exp(-T/b)", [1e-11, 1.0], "");
+    let capacity = decay(3.3, 0.47, "a*exp(-T/(1e12*b))", [3.0, 1e-13], "noise = { sigma = 0.01 }");
+    for ((graph, values), expected) in [(current, [4e-11, 1.7]), (capacity, [3.3, 4.7e-13])] {
+        let solution = solved(&graph, &values);
+        let termination = &solution.outcome.termination;
+        assert!(termination.is_converged(), "{termination:?}");
+        assert!(solution.outcome.undetermined.is_none(), "{:?}", solution.outcome.undetermined);
+        for (key, expected) in ["a", "b"].into_iter().zip(expected) {
+            let found = number(&solution.values, key);
+            assert!((found / expected - 1.0).abs() < 1e-6, "{key}: {found}, not {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_cost_that_no_step_changes_hides_no_other() {
+    let (mut graph, mut values) = ring(30, 1.0, 0.0, |_| 0.01);
+    let expected = solved(&graph, &values).outcome.final_cost;
+    for key in ["here", "there"] {
+        values.insert(key, Se2::identity());
+        graph.fix(key);
+    }
+    let far = Between { relative: Se2::exp(&Vector3::new(1e4, 0.0, 0.0)) };
+    graph.add(["here", "there"], far).noise(Noise::sigma(1e-3).unwrap());
+    let outcome = solved(&graph, &values).outcome;
+    let others = outcome.final_cost - 0.5e14;
+    assert!((others - expected).abs() < 0.1 + 0.01 * expected, "{others}, not {expected}");
+}
+
+#[test]
+fn information_of_others_leaves_no_variable_open() {
+    use manifactor::geometry::Point1;
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    let point = |x: f64| Point1::new(Vector1::new(x));
+    values.insert("a", point(0.5));
+    values.insert("b", point(0.5));
+    graph.add(["a"], Prior { value: point(1.0) }).noise(Noise::sigma(1.0).unwrap());
+    graph.add(["b"], Prior { value: point(2.0) }).noise(Noise::sigma(1e-14).unwrap());
+    let solution = solved(&graph, &values);
+    assert!(solution.outcome.undetermined.is_none(), "{:?}", solution.outcome.undetermined);
+    let mut problem = manifactor::solve::Problem::compile(&graph, &solution.values).unwrap();
+    let covariance = problem.joint_covariance(&["a"]).unwrap();
+    assert!((covariance[(0, 0)] - 1.0).abs() < 1e-9, "{covariance}");
 }

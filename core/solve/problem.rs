@@ -82,6 +82,21 @@ impl Problem {
         place.start.map(|s| s..s + place.tangent.len())
     }
 
+    /// Returns the cost of the factors between fixed variables.
+    pub(crate) fn constant_cost(&self) -> f64 {
+        let variables = &self.model.variables;
+        let is_fixed =
+            |variable: &u32| variables[*variable as usize].unknowns().all(|unknown| unknown.is_none());
+        let is_constant: Vec<bool> =
+            self.model.factors.iter().map(|factor| factor.variables.iter().all(is_fixed)).collect();
+        if !is_constant.contains(&true) {
+            return 0.0;
+        }
+        let mut costs = vec![];
+        self.model.factor_costs(&mut costs);
+        costs.iter().zip(is_constant).filter(|(_, is_constant)| *is_constant).map(|(cost, _)| cost).sum()
+    }
+
     /// Returns the coordinate to which each scalar unknown adds; `None` for unknowns without one, such as rotations.
     pub(crate) fn coordinates(&self) -> Vec<Option<f64>> {
         let mut all = vec![None; self.dim()];

@@ -13,6 +13,7 @@ mod tests;
 
 pub use faults::{Axes, Fault, Sensor};
 
+use crate::damage::{Damage, damage};
 use crate::samples::ImuReading;
 use crate::visual::TrackedPoint;
 use gravity::GravityFit;
@@ -29,6 +30,9 @@ const MIN_GAIN: f64 = 40.0;
 const MIN_SHARE: f64 = 0.05;
 /// Smallest gain by points that come before the camera, as a share of the cost of those behind it.
 const MIN_BEHIND: f64 = 0.25;
+/// Largest share of the points behind the camera that may stay there, if nothing else shows wrong axes. A velocity that
+/// is not known well puts some behind it, and one of many axes brings a part of them before it by chance.
+const MAX_LEFT_BEHIND: f64 = 0.2;
 /// Minimum number of pairs of images.
 const MIN_PAIRS: usize = 10;
 /// Faults are first judged with every third pair of images, and the best ones again with all.
@@ -83,6 +87,8 @@ pub struct Finding {
 pub struct Diagnosis {
     /// Probable faults, the most probable first. Each is judged with the earlier ones corrected.
     pub findings: Vec<Finding>,
+    /// Readings of the IMU that a working sensor does not give.
+    pub damage: Vec<Damage>,
     /// Number of pairs of images that were compared.
     pub pairs: usize,
     /// Number of points in all pairs.
@@ -254,7 +260,16 @@ impl Recording {
         fit.check()?;
         let Fit { rotation: RotationFit { median: residual, points, .. }, gravity } = fit;
         let is_explained = pairs >= MIN_PAIRS && residual <= MAX_RESIDUAL;
-        Ok(Diagnosis { findings, pairs, points, residual, gravity: gravity.mean.norm(), is_explained })
+        let damage = damage(&self.readings);
+        Ok(Diagnosis {
+            findings,
+            damage,
+            pairs,
+            points,
+            residual,
+            gravity: gravity.mean.norm(),
+            is_explained,
+        })
     }
 
     fn check_sensors(&self) -> Result<(), DiagnosisError> {
@@ -367,8 +382,9 @@ impl Recording {
             let corrected = gravity::behind(&self.corrected(&judged.fault), &pairs, &null.rotation);
             (judged.gain + behind.cost - corrected.cost, judged.fault, corrected.points)
         };
-        let is_probable = |(gain, fault, _): &(f64, Fault, usize)| match fault {
+        let is_probable = |(gain, fault, left): &(f64, Fault, usize)| match fault {
             Fault::MountingInMillimetres => *gain >= MIN_GAIN,
+            Fault::AccelerometerAxes { .. } if *left as f64 > MAX_LEFT_BEHIND * behind.points as f64 => false,
             _ => *gain >= MIN_BEHIND * behind.cost,
         };
         let is_new = |fault: &Fault| is_new(fault, found_before);

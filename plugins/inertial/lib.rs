@@ -4,6 +4,7 @@
 //! turns these samples into one relative motion, with its covariance and its derivative with respect to the
 //! biases. [`Imu`] is the factor of this motion. Its variables are pose, velocity and bias at both ends, so
 //! every other factor on poses works beside it.
+mod damage;
 pub mod diagnosis;
 mod imu;
 mod preintegration;
@@ -12,6 +13,7 @@ mod samples;
 pub mod testing;
 pub mod visual;
 
+pub use damage::{Damage, DamageKind, damage};
 pub use imu::Imu;
 pub use preintegration::{Preintegration, RelativeMotion};
 pub use samples::{CoverageError, ImuDensities, ImuReading, ImuSample, MAX_RATE, SampleError};

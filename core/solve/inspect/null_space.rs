@@ -9,9 +9,9 @@ use std::time::Instant;
 const SEARCH_PIVOT: f64 = 1e-11;
 /// A direction v of unit length in the metric of the diagonal is undetermined if ‖J v‖² is below this.
 const MAX_CURVATURE: f64 = 1e-15;
-/// A diagonal entry below this share of the largest is rounding error.
+/// A diagonal entry below this share of its [reference](references) is rounding error.
 const ROUNDING_SHARE: f64 = 1e-24;
-/// Lower bound of diagonal entries in that metric, as a share of the largest entry.
+/// Lower bound of diagonal entries in that metric, as a share of their reference.
 const DIAGONAL_FLOOR: f64 = 1e-9;
 /// Damping that makes the matrix positive definite for the search.
 const SEARCH_DAMPING: f64 = 1e-10;
@@ -42,22 +42,47 @@ pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) ->
     found
 }
 
+/// Returns what each diagonal entry of H is compared with: the largest one among the unknowns that share a factor with
+/// it. Coordinates below one are counted in units of their own value, so that a capacity in farads does not hide a voltage.
+fn references(problem: &Problem) -> Vec<f64> {
+    let coordinates = problem.coordinates();
+    let size = |x: &Option<f64>| x.filter(|x| *x != 0.0).map_or(1.0, |x| x.abs().min(1.0));
+    let entries: Vec<f64> =
+        problem.system.diagonal().zip(&coordinates).map(|(d, x)| d * size(x) * size(x)).collect();
+    let (starts, rows, ..) = problem.normal_equations();
+    let mut largest = entries.clone();
+    for (column, range) in starts.windows(2).enumerate() {
+        for row in &rows[range[0]..range[1]] {
+            let row = *row as usize;
+            largest[column] = largest[column].max(entries[row]);
+            largest[row] = largest[row].max(entries[column]);
+        }
+    }
+    largest
+}
+
 fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
-    let Problem { model, system, .. } = problem;
-    let largest = system.largest();
+    let largest = problem.system.largest();
+    let (mut is_pivot_small, mut is_entry_small) = (false, false);
     if !failed {
-        let mut suspicious = false;
         let share = SEARCH_PIVOT.max(10.0 * damping);
-        system.pivots(&mut |pivot, entry| {
+        problem.system.pivots(&mut |pivot, entry| {
             // a pivot that is NaN is suspicious too
-            suspicious |= pivot.is_nan() || pivot < share * entry || entry <= ROUNDING_SHARE * largest;
+            is_pivot_small |= pivot.is_nan() || pivot < share * entry;
+            is_entry_small |= entry <= ROUNDING_SHARE * largest;
         });
-        if !suspicious {
+        if !is_pivot_small && !is_entry_small {
             return None;
         }
     }
-    let floor = if largest > 0.0 { DIAGONAL_FLOOR * largest } else { 1.0 };
-    let scale: Vec<f64> = system.diagonal().map(|d| d.max(floor)).collect();
+    let references = references(problem);
+    let Problem { model, system, .. } = problem;
+    let is_rounding = |(entry, reference): (&f64, &f64)| *entry <= ROUNDING_SHARE * reference;
+    if !failed && !is_pivot_small && !system.diagonal().zip(&references).any(is_rounding) {
+        return None;
+    }
+    let floor = |reference: f64| if reference > 0.0 { DIAGONAL_FLOOR * reference } else { 1.0 };
+    let scale: Vec<f64> = system.diagonal().zip(&references).map(|(d, r)| d.max(floor(*r))).collect();
     let shift: Vec<f64> = scale.iter().map(|d| SEARCH_DAMPING * d).collect();
     system.factorize_directly(Some(&shift)).ok()?;
     // inverse iteration from a start vector with a component in every direction

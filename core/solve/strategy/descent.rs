@@ -115,6 +115,8 @@ pub struct Descent<'a> {
     initial_diagonal: Vec<f64>,
     observer: &'a mut dyn Observer,
     initial_cost: f64,
+    /// Cost of the factors between fixed variables, which no step changes.
+    constant_cost: f64,
     clock: Instant,
     compile: f64,
     history: Vec<IterationRecord>,
@@ -152,6 +154,7 @@ impl<'a> Descent<'a> {
             iterations: 0,
             observer,
             initial_cost: at.cost,
+            constant_cost: 0.0,
             clock,
             compile,
             history: Vec::with_capacity(stop.max_iterations.min(HISTORY)),
@@ -160,6 +163,7 @@ impl<'a> Descent<'a> {
             escapes: 0,
             is_refactorized: false,
         };
+        descent.constant_cost = descent.problem.constant_cost();
         match descent.not_finite() {
             None => Ok(descent),
             Some(termination) => Err(Box::new(descent.account(termination, None))),
@@ -178,6 +182,11 @@ impl<'a> Descent<'a> {
     /// Returns ½ Σ ρ at the estimate.
     pub fn cost(&self) -> f64 {
         self.at.cost
+    }
+
+    /// Returns the cost at the estimate that steps can change. Relative changes are shares of it.
+    fn changing_cost(&self) -> f64 {
+        (self.at.cost - self.constant_cost).abs()
     }
 
     /// Returns the gradient g = Jᵀr at the estimate.
@@ -329,7 +338,7 @@ impl<'a> Descent<'a> {
     /// Returns the largest cosine between the residual vector and a column of the Jacobian. It is zero if
     /// the gradient is, and independent of units: the test `gtol` of MINPACK.
     fn largest_cosine(&self) -> f64 {
-        let length = (2.0 * self.at.cost).sqrt();
+        let length = (2.0 * self.changing_cost()).sqrt();
         let cosine = |(g, d): (&f64, &f64)| if *d > 0.0 { g.abs() / (d.sqrt() * length) } else { 0.0 };
         self.problem.system.g.iter().zip(self.problem.system.diagonal()).map(cosine).fold(0.0, f64::max)
     }
@@ -392,7 +401,7 @@ impl<'a> Descent<'a> {
 
     /// Returns whether a change of the cost is within the relative tolerance.
     pub(crate) fn is_small(&self, change: f64) -> bool {
-        change.abs() <= self.stop.relative_cost() * self.at.cost.abs()
+        change.abs() <= self.stop.relative_cost() * self.changing_cost()
     }
 
     /// Returns the reason for the lack of an acceptable step, from the last trial step, which is almost
@@ -431,7 +440,7 @@ impl<'a> Descent<'a> {
     /// A small solve continues to rounding error; if its iterations run out, it has converged.
     pub(crate) fn ends(&mut self, termination: &Termination, change: f64) -> bool {
         let continues = *termination == Termination::Converged { reason: Tolerance::RelativeCost }
-            && change.abs() > self.stop.exact_cost(self.problem.dim()) * self.at.cost.abs();
+            && change.abs() > self.stop.exact_cost(self.problem.dim()) * self.changing_cost();
         if continues && self.settled.is_none() {
             self.settled = Some(termination.clone());
         }
@@ -447,11 +456,12 @@ impl<'a> Descent<'a> {
     pub fn accept(&mut self, step: &TrialStep) -> Option<Termination> {
         self.problem.model.accept();
         let (before, after) = (self.at.cost, self.trial.cost);
+        let share = self.stop.relative_cost() * self.changing_cost();
         let inactive = self.at.inactive;
         self.at = self.problem.linearize();
         self.trial = self.at;
         self.change = (before - after).abs();
-        let is_small = self.change <= self.stop.relative_cost() * before.abs();
+        let is_small = self.change <= share;
         if !is_small {
             self.settled = None;
         }

@@ -115,9 +115,10 @@ impl Frames {
             })?;
             return Ok(if time > NANOSECONDS { 1e-9 * time } else { time });
         }
-        self.time(number_of_name(without_export(stem)).map_err(|fault| {
-            Mistake::Row(format!("the name of the image `{name}` {fault}"))
-        })?)
+        self.time(
+            number_of_name(without_export(stem))
+                .map_err(|fault| Mistake::Row(format!("the name of the image `{name}` {fault}")))?,
+        )
     }
 }
 

@@ -40,6 +40,28 @@ fn a_recording_without_a_fault_has_none() {
 }
 
 #[test]
+fn parts_of_a_recording_without_a_fault_have_none() {
+    for (from, to) in [(0.0, 2.5), (0.0, 3.0), (0.0, 3.5), (0.0, 4.0), (3.0, 8.0), (4.0, 8.0), (2.0, 6.0)] {
+        for seed in 2..6 {
+            let SimulatedFlight { readings, images, camera, body_from_camera, .. } =
+                SimulatedFlight::new(8.0, seed);
+            let within = |time: f64| (from..=to).contains(&time);
+            let readings = readings.into_iter().filter(|reading| within(reading.timestamp)).collect();
+            let images = images.into_iter().filter(|(time, _)| within(*time)).collect();
+            let recording = Recording::new(readings, images, camera, body_from_camera, 9.81);
+            match recording.diagnose() {
+                Ok(diagnosis) => {
+                    let Diagnosis { findings, damage, .. } = diagnosis;
+                    assert!(findings.is_empty() && damage.is_empty(), "{from} {to} {seed}: {findings:#?}");
+                }
+                Err(DiagnosisError::FewPairs { .. }) => {}
+                Err(other) => panic!("{from} {to} {seed}: {other}"),
+            }
+        }
+    }
+}
+
+#[test]
 fn units_and_signs_of_the_gyroscope_are_named() {
     assert_named("the gyroscope is in degrees", |r| gyroscope(r, |x| x * 57.295_78));
     assert_named("the gyroscope turns the other way", |r| gyroscope(r, |x| -x));
@@ -53,6 +75,7 @@ fn units_and_signs_of_the_accelerometer_are_named() {
     assert_named("the accelerometer is in mm/s²", |r| accelerometer(r, |x| x * 1e3));
     assert_named("the accelerometer has the opposite sign", |r| accelerometer(r, |x| -x));
     assert_named("the accelerometer has other axes", |r| accelerometer(r, |x| Vector3::new(x.z, x.x, x.y)));
+    assert_named("the accelerometer has other axes", |r| accelerometer(r, |x| Vector3::new(-x.x, -x.y, x.z)));
     assert_named("the accelerometer shows a gravity of 9.", |r| r.gravity = 1.62);
 }
 

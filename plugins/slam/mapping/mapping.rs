@@ -264,7 +264,12 @@ impl Mapping {
             }
         }
         if self.mapped().next().is_none() {
-            self.warnings.push(Warning::NoObjects { detected: self.objects.len() });
+            let unread =
+                sequence.unused.iter().filter(|unused| matches!(unused, UnusedInput::Box { .. })).count();
+            self.warnings.push(match (sequence.detections.len(), unread) {
+                (0, 1..) => Warning::NoReadableBoxes { boxes: unread },
+                (boxes, _) => Warning::NoObjects { boxes, detected: self.objects.len() },
+            });
         } else if !settings.association.uses_source_ids() && settings.detections.loss.is_none() {
             self.warnings.push(Warning::NotRobust);
         }

@@ -26,7 +26,7 @@ pub use detections::DetectionsFile;
 pub use interpolation::NoPose;
 pub use json_lines::parse;
 pub use json_lines::{FrameLine, FurtherCamera, JsonLines, format_line};
-pub use mcap::{FurtherMcapCamera, Mcap, McapError};
+pub use mcap::{FurtherMcapCamera, Mcap, McapError, McapFixes};
 pub use recorded::{FurtherRecordedCamera, RecordedFiles};
 pub use stream::FrameStream;
 pub use tum::TumRgbd;

@@ -102,6 +102,56 @@ fn codes(ending: &str) -> Vec<i32> {
             assert_eq!(code(run), 0);
             codes(&[&format!("{run} {small}")])
         }
+        "there are boxes, and none can be read" => {
+            let simulated = run(["simulate", &at("seen.toml"), "--lines"], &[]).stdout;
+            let in_percent = |line: &str| {
+                let mut frame: serde_json::Value = serde_json::from_str(line).unwrap();
+                for seen in frame["boxes"].as_array_mut().unwrap() {
+                    seen["score"] = 70.0.into();
+                }
+                format!("{frame}\n")
+            };
+            let lines: String = simulated.lines().map(in_percent).collect();
+            std::fs::write(at("percent.jsonl"), lines).unwrap();
+            let camera =
+                "camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
+            let source = format!("source = {{ type = 'json_lines', file = 'percent.jsonl', {camera} }}\n");
+            std::fs::write(at("percent.toml"), source).unwrap();
+            codes(&["run @percent.toml --out @out", "online @percent.toml --out @out2"])
+        }
+        "readings of an IMU are damaged, or most tracks give no landmark" => {
+            let flight = root().join("examples/flight");
+            let copy = |name: &str| std::fs::read_to_string(flight.join(name)).unwrap();
+            let clipped = |line: &str| {
+                let cells = line.split(',').enumerate().map(|(i, cell)| match (i, cell.parse::<f64>()) {
+                    (1..=3, Ok(rate)) => rate.clamp(-0.5, 0.5).to_string(),
+                    _ => cell.to_owned(),
+                });
+                cells.collect::<Vec<_>>().join(",") + "\n"
+            };
+            let renumbered = |(i, line): (usize, &str)| {
+                let cells: Vec<&str> = line.split(',').collect();
+                let number = if i == 0 { cells[1].to_owned() } else { i.to_string() };
+                format!("{},{number},{},{}\n", cells[0], cells[2], cells[3])
+            };
+            let (imu, tracks) = (copy("imu.csv"), copy("tracks.csv"));
+            let files = [
+                ("truth.csv", copy("truth.csv")),
+                ("vio.toml", copy("vio.toml")),
+                ("clipped.csv", imu.lines().map(clipped).collect()),
+                ("renumbered.csv", tracks.lines().enumerate().map(renumbered).collect()),
+                ("imu.csv", imu.clone()),
+                ("tracks.csv", tracks.clone()),
+            ];
+            files.iter().for_each(|(name, text)| std::fs::write(at(name), text).unwrap());
+            let vio = "vio @vio.toml --out @out --force";
+            assert_eq!([code(vio), code("doctor @vio.toml")], [0, 0]);
+            codes(&[
+                &format!("{vio} --set imu=clipped.csv"),
+                "doctor @vio.toml --set imu=clipped.csv",
+                &format!("{vio} --set tracks=renumbered.csv"),
+            ])
+        }
         "a journal cannot be kept" => {
             let online = "online @seen.toml --out @out --force --set objects.min_views=1 --journal";
             assert_eq!(code(&format!("{online} @frames.jsonl")), 0);

@@ -265,7 +265,8 @@ fn positions_by_satellites_correct_a_trajectory() {
     std::fs::write(path(&folder, "drive.mcap"), recording(&topics, messages.into_iter())).unwrap();
     let source = block("slam-systems.md", "toml", "drive.mcap");
     let fixes = block("slam-systems.md", "toml", "source.fixes").replace("antenna = [", "# antenna = [");
-    let plain = format!("{source}ground_truth = \"truth.txt\"\n");
+    let settings = "association = { type = \"likelihood\" }\nvariance_components = {}\n";
+    let plain = format!("{settings}{source}ground_truth = \"truth.txt\"\n");
     for (name, document) in [("without", plain.clone()), ("with", format!("{plain}{fixes}"))] {
         std::fs::write(path(&folder, &format!("{name}.toml")), document).unwrap();
     }

@@ -43,14 +43,16 @@ impl Doctor {
         } else {
             output::print(&text(&diagnosis));
         }
-        let is_healthy = diagnosis.findings.is_empty() && diagnosis.is_explained;
+        let is_healthy =
+            diagnosis.findings.is_empty() && diagnosis.damage.is_empty() && diagnosis.is_explained;
         Ok(if is_healthy { Status::Done } else { Status::FaultsFound })
     }
 }
 
 fn text(diagnosis: &Diagnosis) -> String {
-    let Diagnosis { findings, pairs, points, residual, gravity, is_explained } = diagnosis;
+    let Diagnosis { findings, damage, pairs, points, residual, gravity, is_explained } = diagnosis;
     let mut text = String::new();
+    damage.iter().for_each(|damage| _ = writeln!(text, "{damage}"));
     for (i, Finding { fault, gain, evidence, alternatives }) in findings.iter().enumerate() {
         let _ = writeln!(text, "{}. {fault}", i + 1);
         for alternative in alternatives {
@@ -63,7 +65,8 @@ fn text(diagnosis: &Diagnosis) -> String {
         _ if !is_explained => {
             writeln!(text, "the points do not fit the IMU, and known faults do not explain this:")
         }
-        0 => writeln!(text, "no fault found"),
+        0 if damage.is_empty() => writeln!(text, "no fault found"),
+        0 => writeln!(text, "readings are damaged; no other fault found"),
         n => writeln!(text, "{}; with all corrections:", count(n, "probable fault")),
     };
     let _ = writeln!(

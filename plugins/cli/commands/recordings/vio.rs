@@ -12,11 +12,11 @@ use manifactor::config::Errors;
 use manifactor::formats::inertial::{Tracks, read_imu, read_states, read_tracks};
 use manifactor::formats::tum::{self, StampedPose};
 use manifactor::geometry::{Camera, CameraModel};
-use manifactor::inertial::ImuReading;
 use manifactor::inertial::diagnosis::Image;
 use manifactor::inertial::visual::{
     InertialState, VisualInertial, VisualInertialDocument, VisualInertialEstimate,
 };
+use manifactor::inertial::{ImuReading, damage};
 use manifactor::slam::metrics::{Alignment, MetricsError, absolute_error, align, associate};
 use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::solve::{AllObservers, Interrupt, Observer};
@@ -74,11 +74,20 @@ impl Vio {
         let errors = truth
             .map(|truth| Ok::<_, MetricsError>([error(&truth, online)?, error(&truth, &estimate.states)?]));
         let errors = errors.transpose().map_err(Failure::input)?;
-        self.print(&estimate, seconds, errors, out);
-        Ok(Status::from(&estimate.outcome.termination))
+        let doubts = doubts(&readings, &estimate);
+        self.print(&estimate, seconds, errors, &doubts, out);
+        let found = if doubts.is_empty() { Status::Done } else { Status::FaultsFound };
+        Ok(found.max(Status::from(&estimate.outcome.termination)))
     }
 
-    fn print(&self, estimate: &VisualInertialEstimate, seconds: f64, errors: Option<[f64; 2]>, out: &Path) {
+    fn print(
+        &self,
+        estimate: &VisualInertialEstimate,
+        seconds: f64,
+        errors: Option<[f64; 2]>,
+        warnings: &[String],
+        out: &Path,
+    ) {
         let VisualInertialEstimate { states, outcome, landmarks, short_tracks } = estimate;
         let milliseconds = 1e3 * seconds / states.len().max(1) as f64;
         if self.json {
@@ -91,6 +100,7 @@ impl Vio {
                 "final_cost": outcome.final_cost,
                 "online_ate": errors.map(|errors| errors[0]),
                 "ate": errors.map(|errors| errors[1]),
+                "warnings": warnings,
             }));
             return;
         }
@@ -104,8 +114,25 @@ impl Vio {
         if let Some([online, whole]) = errors {
             text += &format!("ATE {:.2} cm online, {:.2} cm for the batch\n", 100.0 * online, 100.0 * whole);
         }
+        warnings.iter().for_each(|warning| text += &format!("warning: {warning}\n"));
         output::print(&(text + &format!("Written to {}\n", out.display())));
     }
+}
+
+/// Returns reasons to doubt an estimate that converged.
+fn doubts(readings: &[ImuReading], estimate: &VisualInertialEstimate) -> Vec<String> {
+    /// Largest share of tracks that become no landmark. Points at the border and on wrong tracks are a minority.
+    const MAX_SHORT: f64 = 0.5;
+    let mut doubts: Vec<String> = damage(readings).iter().map(ToString::to_string).collect();
+    let VisualInertialEstimate { landmarks, short_tracks, .. } = estimate;
+    let tracks = landmarks + short_tracks;
+    if *short_tracks as f64 > MAX_SHORT * tracks as f64 {
+        doubts.push(format!(
+            "{short_tracks} of {tracks} tracks give no landmark, so that the IMU alone determines much of the motion: check that a \
+             track keeps its number from image to image, and `body_from_camera` with `manifactor doctor`"
+        ));
+    }
+    doubts
 }
 
 /// Reads a document, with values that replace its own.

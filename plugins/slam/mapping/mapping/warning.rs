@@ -106,8 +106,15 @@ pub enum Warning {
         /// Gain in log-likelihood.
         gain: f64,
     },
+    /// None of the boxes can be read.
+    NoReadableBoxes {
+        /// Number of boxes.
+        boxes: usize,
+    },
     /// The map has no objects.
     NoObjects {
+        /// Number of boxes that were read.
+        boxes: usize,
         /// Number of detected objects.
         detected: usize,
     },
@@ -169,7 +176,13 @@ pub enum Warning {
 impl Warning {
     /// Returns whether the map lacks a part of the detections that was expected in it.
     pub fn is_partial(&self) -> bool {
-        matches!(self, Self::TooManyUnused { .. } | Self::OutsideImage { .. } | Self::NormalizedBoxes { .. })
+        matches!(
+            self,
+            Self::TooManyUnused { .. }
+                | Self::OutsideImage { .. }
+                | Self::NormalizedBoxes { .. }
+                | Self::NoReadableBoxes { .. }
+        )
     }
 }
 
@@ -214,10 +227,14 @@ impl fmt::Display for Warning {
                  and y by the height, {height}"
             ),
             Self::NotMapped { what, remedy } => write!(f, "not mapped: {what}; {remedy}"),
-            Self::NoObjects { detected: 0 } => f.write_str(
+            Self::NoReadableBoxes { boxes } => {
+                write!(f, "none of {boxes} boxes can be read, so the map has no objects")
+            }
+            Self::NoObjects { boxes: 0, .. } => f.write_str("the source has no boxes, so the map has no objects"),
+            Self::NoObjects { detected: 0, .. } => f.write_str(
                 "no box says which object it shows; `association = { type = \"likelihood\" }` finds out",
             ),
-            Self::NoObjects { detected } => {
+            Self::NoObjects { detected, .. } => {
                 write!(f, "none of {detected} detected objects is mapped; see why in objects.json")
             }
             Self::RunAway { objects } => write!(

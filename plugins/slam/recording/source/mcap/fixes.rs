@@ -107,6 +107,9 @@ struct UsedFix {
     sigma: f64,
 }
 
+/// A position by odometry and one by satellites, without their means, and the weight of the two.
+type WeightedPair = (Vector3<f64>, Vector3<f64>, f64);
+
 /// The odometry with which positions are compared.
 pub(super) struct FixedOdometry<'a> {
     /// Poses of the camera in the odometry frame, sorted by time.
@@ -210,12 +213,12 @@ impl FixedOdometry<'_> {
             Some(up) => x - *up * up.dot(&x),
             None => x,
         };
-        let pairs = used.iter().map(|fix| {
+        let pairs = used.iter().map(|fix| -> WeightedPair {
             let x = horizontal(fix.by_odometry - means[0], self.up);
             let y = horizontal(fix.east_north_up - means[1], self.up.map(|_| Direction::Z));
             (x, y, 1.0)
         });
-        let extents = |of: fn(&(Vector3<f64>, Vector3<f64>, f64)) -> Vector3<f64>| {
+        let extents = |of: fn(&WeightedPair) -> Vector3<f64>| {
             let scatter: Matrix3<f64> = pairs.clone().map(|pair| of(&pair) * of(&pair).transpose()).sum();
             let mut extents: [f64; 3] =
                 scatter.symmetric_eigen().eigenvalues.map(|x| x.max(0.0).sqrt()).into();
