@@ -156,15 +156,15 @@ mod tests {
             .prop_map(|Position { position, lever_arm }| ExternalPosition { position, lever_arm })
     }
 
-    #[test]
-    fn in_the_frame_of_the_map_an_external_position_is_a_position() {
-        check((any_external(), any_se3()), |(external, x)| {
+    proptest! {
+        #[test]
+        fn in_the_frame_of_the_map_an_external_position_is_a_position(external in any_external(), x in any_se3()) {
             let ExternalPosition { position, lever_arm } = external.clone();
             let plain = Position { position, lever_arm };
-            let (a, b) = (external.residual::<f64>((Se3::identity(), x)), plain.residual::<f64>((x,)));
+            let (a, b) =
+                (external.residual::<f64>((Se3::identity(), x)), plain.residual::<f64>((x,)));
             prop_assert!((a - b).norm() < 1e-12);
-            Ok(())
-        });
+        }
     }
 
     #[test]
