@@ -1,4 +1,5 @@
 //! The dynamic view of a graph, for building, editing, reading and writing.
+mod fixed;
 mod version;
 
 use crate::factor::{Factor, FactorEntry};
@@ -10,14 +11,12 @@ use crate::variable::manifold_name;
 use crate::variable::{Bounds, Interval, OutOfBounds};
 use indexmap::IndexMap;
 use nalgebra::DVector;
-use serde::de::value::SeqAccessDeserializer;
-use serde::de::{SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use std::any::TypeId;
-use std::fmt;
 use std::sync::Arc;
 
+pub use fixed::Fixed;
 pub use version::Version;
 
 /// Factors between named variables, the fixed variables, and the bounds of variables.
@@ -32,65 +31,6 @@ pub struct Graph {
     /// Renewed by every method that gives mutable access to the content.
     #[serde(skip)]
     version: Version,
-}
-
-/// The fixed part of a variable, which stays at its initial value.
-#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
-#[serde(untagged)]
-pub enum Fixed {
-    /// All of it (`true`), or nothing.
-    Whole(bool),
-    /// These directions of the tangent space, by name.
-    Directions(Vec<String>),
-}
-
-impl<'de> Deserialize<'de> for Fixed {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        struct FixedVisitor;
-        impl<'de> Visitor<'de> for FixedVisitor {
-            type Value = Fixed;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("true, false, or an array of directions of the tangent space")
-            }
-            fn visit_bool<E: serde::de::Error>(self, whole: bool) -> Result<Fixed, E> {
-                Ok(Fixed::Whole(whole))
-            }
-            fn visit_seq<A: SeqAccess<'de>>(self, names: A) -> Result<Fixed, A::Error> {
-                Deserialize::deserialize(SeqAccessDeserializer::new(names)).map(Fixed::Directions)
-            }
-        }
-        from.deserialize_any(FixedVisitor)
-    }
-}
-
-impl Default for Fixed {
-    fn default() -> Self {
-        Self::Whole(false)
-    }
-}
-
-impl Fixed {
-    /// Returns one bit for each tangent direction, set if the direction is fixed.
-    pub fn bits(&self, tangent: &[&str]) -> u32 {
-        let bit = |name: &str| tangent.iter().position(|t| *t == name).map_or(0, |i| 1 << i);
-        match self {
-            Self::Whole(true) => u32::MAX.checked_shr(32 - tangent.len().min(32) as u32).unwrap_or(0),
-            Self::Whole(false) => 0,
-            Self::Directions(names) => names.iter().fold(0, |bits, name| bits | bit(name)),
-        }
-    }
-
-    /// Reports directions that the tangent space does not have.
-    pub fn check(&self, key: &Key, tangent: &'static [&'static str], errors: &mut Vec<GraphError>) {
-        if let Self::Directions(directions) = self {
-            let unknown = directions.iter().filter(|d| !tangent.contains(&d.as_str()));
-            errors.extend(unknown.map(|d| GraphError::UnknownDirection {
-                key: key.clone(),
-                direction: d.clone(),
-                tangent,
-            }));
-        }
-    }
 }
 
 /// An error between a graph and its values. `factor` is the index in the graph, from 0.
@@ -217,6 +157,21 @@ impl GraphError {
     }
 }
 
+impl GraphError {
+    /// Returns an error for each fixed direction that a variable does not have.
+    pub fn unknown_directions<'a>(
+        key: &'a Key,
+        fixed: &'a Fixed,
+        tangent: &'static [&'static str],
+    ) -> impl Iterator<Item = Self> + 'a {
+        let unknown = fixed.unknown_directions(tangent);
+        unknown.map(move |direction| {
+            let direction = direction.to_owned();
+            Self::UnknownDirection { key: key.clone(), direction, tangent }
+        })
+    }
+}
+
 impl Graph {
     /// Makes an empty graph.
     pub fn new() -> Self {
@@ -258,11 +213,16 @@ impl Graph {
     pub fn fix(&mut self, key: impl Into<Key>) {
         self.set_fixed(key, Fixed::Whole(true));
     }
-    /// Fixes some directions of a variable's tangent space, by name. The directions are those at the
-    /// current estimate of the variable.
+    /// Fixes some directions of a variable's tangent space, by name, in addition to those that are fixed. The directions
+    /// are those at the current estimate of the variable.
     pub fn fix_directions(&mut self, key: impl Into<Key>, directions: &[&str]) {
-        let directions = directions.iter().map(|d| (*d).to_owned()).collect();
-        self.set_fixed(key, Fixed::Directions(directions));
+        let key = key.into();
+        let directions = Fixed::Directions(directions.iter().map(|d| (*d).to_owned()).collect());
+        let fixed = match self.fixed.get(&key) {
+            Some(before) => before.clone().with(directions),
+            None => directions,
+        };
+        self.set_fixed(key, fixed);
     }
     /// Sets the fixed part of a variable.
     pub fn set_fixed(&mut self, key: impl Into<Key>, fixed: Fixed) {
@@ -277,7 +237,8 @@ impl Graph {
         &self.fixed
     }
     /// Bounds a coordinate of a variable, by the name of its direction:
-    /// `graph.bound("camera", "f", Interval::new(400.0..=600.0)?)`. Steps stop at the bounds.
+    /// `graph.bound("camera", "f", Interval::new(400.0..=600.0)?)`. Steps stop at the bounds. A limit that the interval
+    /// does not have stays as it is.
     pub fn bound(&mut self, key: impl Into<Key>, direction: impl Into<String>, interval: Interval) {
         self.version = Version::default();
         self.bounds.entry(key.into()).or_default().insert(direction, interval);
@@ -299,13 +260,17 @@ impl Graph {
         self.factors_mut().extend(other.factors.iter().cloned());
         self.hold_all_like(other);
     }
-    /// Fixes and bounds a variable as another graph does.
+    /// Fixes and bounds a variable as another graph does, in addition to what is fixed and bounded here.
     pub fn hold_like(&mut self, other: &Self, key: &Key) {
-        if let Some(fixed) = other.fixed.get(key) {
-            self.set_fixed(key.clone(), fixed.clone());
+        match other.fixed.get(key) {
+            Some(Fixed::Directions(names)) => {
+                self.fix_directions(key.clone(), &names.iter().map(String::as_str).collect::<Vec<_>>());
+            }
+            Some(whole) => self.set_fixed(key.clone(), whole.clone()),
+            None => {}
         }
-        if let Some(bounds) = other.bounds.get(key) {
-            self.set_bounds(key.clone(), bounds.clone());
+        for (direction, interval) in other.bounds.get(key).into_iter().flat_map(Bounds::iter) {
+            self.bound(key.clone(), direction, interval);
         }
     }
     /// Fixes and bounds variables as another graph does.
@@ -378,7 +343,7 @@ impl Graph {
                 errors.push(GraphError::MissingFixed { key: key.clone() });
                 continue;
             };
-            fixed.check(key, value.erased().tangent(), &mut errors);
+            errors.extend(GraphError::unknown_directions(key, fixed, value.erased().tangent()));
         }
         for (key, bounds) in &self.bounds {
             match values.variable(key.as_str()) {

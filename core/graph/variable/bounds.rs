@@ -141,9 +141,17 @@ impl fmt::Display for Interval {
 pub struct Bounds(IndexMap<String, Interval>);
 
 impl Bounds {
-    /// Sets the interval of a direction.
+    /// Sets the limits of a direction. A limit that the interval does not have stays as it is, unless it contradicts the
+    /// other one.
     pub fn insert(&mut self, direction: impl Into<String>, interval: Interval) {
-        self.0.insert(direction.into(), interval);
+        let direction = direction.into();
+        let before = self.0.get(&direction).copied();
+        let joined = before.and_then(|before| {
+            let min = if interval.min.is_finite() { interval.min } else { before.min };
+            let max = if interval.max.is_finite() { interval.max } else { before.max };
+            Interval::between(min, max).ok()
+        });
+        self.0.insert(direction, joined.unwrap_or(interval));
     }
     /// Returns the bounded directions with their intervals.
     pub fn iter(&self) -> impl Iterator<Item = (&str, Interval)> {
@@ -200,6 +208,16 @@ pub struct OutOfBounds {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn the_limits_of_a_direction_are_set_one_by_one() {
+        let mut bounds = Bounds::default();
+        bounds.insert("x", Interval::new(0.0..).unwrap());
+        bounds.insert("x", Interval::new(..=9.0).unwrap());
+        assert_eq!(bounds.iter().next(), Some(("x", Interval::new(0.0..=9.0).unwrap())));
+        bounds.insert("x", Interval::new(..=-1.0).unwrap());
+        assert_eq!(bounds.iter().next(), Some(("x", Interval::new(..=-1.0).unwrap())));
+    }
 
     #[test]
     fn limits_have_to_be_finite_and_in_order() {

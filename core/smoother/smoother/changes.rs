@@ -107,7 +107,7 @@ impl Smoother {
         for (key, fixed) in factors.fixed() {
             let new = values.variable(key.as_str()).map(|value| value.erased().tangent());
             match new.or_else(|| self.tangent(key.as_str())) {
-                Some(tangent) => fixed.check(key, tangent, &mut errors),
+                Some(tangent) => errors.extend(GraphError::unknown_directions(key, fixed, tangent)),
                 None => errors.push(GraphError::MissingFixed { key: key.clone() }),
             }
         }
@@ -212,8 +212,7 @@ impl Smoother {
         if variable.is_some_and(|v| self.model.record(v).prior_count > 0) {
             return Err(ChangeError::FixedLinearization { key: key.clone() });
         }
-        let mut errors = vec![];
-        fixed.check(key, tangent, &mut errors);
+        let errors: Vec<_> = GraphError::unknown_directions(key, fixed, tangent).collect();
         if !errors.is_empty() {
             return Err(ChangeError::Graph(errors));
         }
