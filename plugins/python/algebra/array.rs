@@ -1,12 +1,12 @@
 //! Arrays of values of one type.
 use crate::chosen::{Chosen, What, known};
 use crate::errors;
-use crate::input::{Columns, fields, to_array};
+use crate::input::{Columns, array_like, fields, to_array};
 use manifactor::graph::Variable;
 use manifactor::graph::catalogue::find;
 use manifactor::graph::quantity::variable_quantity;
 use numpy::{PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
-use pyo3::exceptions::PyIndexError;
+use pyo3::exceptions::{PyAttributeError, PyIndexError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyInt};
 use std::sync::Arc;
@@ -74,6 +74,13 @@ impl ValueArray {
     #[getter]
     fn r#type(&self) -> &'static str {
         self.name
+    }
+
+    fn __setattr__(&self, name: &str, _value: &Bound<'_, PyAny>) -> PyResult<()> {
+        let of = self.name;
+        Err(PyAttributeError::new_err(format!(
+            "an array of `{of}` does not change: create a new one with another `{name}`"
+        )))
     }
 
     /// Returns the fields, each as an array with one row per value.
@@ -169,9 +176,11 @@ fn unpickle_array<'py>(py: Python<'py>, name: &str, text: &str) -> PyResult<Boun
 /// Creates an array from fields, each an array with one row per value.
 #[pyfunction]
 fn array_from_fields<'py>(name: &str, fields: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyAny>> {
-    let rows = fields.iter().find_map(|(_, value)| {
-        value.cast::<PyUntypedArray>().ok().and_then(|array| array.shape().first().copied())
-    });
+    let mut rows = None;
+    for (field, value) in fields {
+        let array = array_like(name, &field.str()?.to_cow()?, &value)?;
+        rows = rows.or(array.and_then(|array| array.shape().first().copied()));
+    }
     let Some(rows) = rows else {
         let message = "expected at least one array with one row per value";
         return Err(errors::argument("from_fields", "fields", message));

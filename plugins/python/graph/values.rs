@@ -3,13 +3,13 @@ use super::{Reduced, Shared, html, pickled, unpickled};
 use crate::algebra::ValueArray;
 use crate::chosen::{What, known, variable};
 use crate::errors;
-use crate::input::{Columns, fields, key_of, key_rows};
+use crate::input::{Columns, dict_of, fields, key_of, key_rows};
 use indexmap::IndexMap;
 use manifactor::graph::catalogue::{Entry, find};
 use manifactor::graph::{Key, Values as Inner, Variable};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyList};
+use pyo3::types::{PyBytes, PyDict, PyList, PyMapping};
 use std::collections::BTreeMap;
 
 /// The values of the variables by key, in insertion order.
@@ -28,7 +28,14 @@ impl Values {
             return Ok(values.borrow().__copy__());
         }
         let mut made = Self::default();
-        for (key, value) in values.cast::<PyDict>()? {
+        if let Ok(values) = values.cast::<PyDict>() {
+            for (key, value) in values {
+                made.__setitem__(&key, &value)?;
+            }
+            return Ok(made);
+        }
+        for item in values.cast::<PyMapping>()?.items()? {
+            let (key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
             made.__setitem__(&key, &value)?;
         }
         Ok(made)
@@ -114,7 +121,7 @@ impl Values {
         &mut self,
         keys: &Bound<'_, PyAny>,
         r#type: &Bound<'_, PyAny>,
-        fields: Option<&Bound<'_, PyDict>>,
+        fields: Option<&Bound<'_, PyAny>>,
         prefix: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let (keys, width) = key_rows("insert_many", keys, prefix)?;
@@ -125,7 +132,8 @@ impl Values {
                 format!("expected one key for each, got {width}"),
             ));
         }
-        let mut rows = Rows::new(keys.len(), r#type, fields)?;
+        let fields = fields.map(dict_of).transpose()?;
+        let mut rows = Rows::new(keys.len(), r#type, fields.as_ref())?;
         let mut made: IndexMap<Key, Box<dyn Variable>> = IndexMap::with_capacity(keys.len());
         for (row, key) in keys.into_iter().enumerate() {
             if let Some(first) = made.get_index_of(&key) {

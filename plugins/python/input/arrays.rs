@@ -41,12 +41,49 @@ pub(crate) fn array<'py>(
     value: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyUntypedArray>> {
     if let Ok(array) = value.cast::<PyUntypedArray>() {
+        check_mask(what, name, array)?;
         return Ok(array.clone());
     }
     let made = value.py().import("numpy")?.call_method1("asarray", (value,));
     let made =
         made.map_err(|error| errors::argument(what, name, format!("expected an array of numbers: {error}")))?;
     Ok(made.cast_into::<PyUntypedArray>()?)
+}
+
+/// Refuses masked entries, because a conversion to numbers would lose the mask.
+fn check_mask(what: &str, name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<()> {
+    let py = array.py();
+    if array.get_type().is(py.get_type::<PyUntypedArray>()) || !array.hasattr("mask")? {
+        return Ok(());
+    }
+    if py.import("numpy")?.getattr("ma")?.call_method1("is_masked", (array,))?.is_truthy()? {
+        let message = "expected an array without masked entries; `numpy.ma.filled` replaces them";
+        return Err(errors::argument(what, name, message));
+    }
+    Ok(())
+}
+
+/// Converts an object with axes that NumPy converts to an array, such as a `pandas.Series`; `None` for
+/// everything else. A NumPy array without axes is an array, but a number of NumPy is not.
+pub(crate) fn array_like<'py>(
+    what: &str,
+    name: &str,
+    value: &Bound<'py, PyAny>,
+) -> PyResult<Option<Bound<'py, PyUntypedArray>>> {
+    if value.cast::<PyUntypedArray>().is_ok() {
+        return array(what, name, value).map(Some);
+    }
+    if !is_array_like(value)? {
+        return Ok(None);
+    }
+    let array = array(what, name, value)?;
+    Ok(Some(array).filter(|array| !array.shape().is_empty()))
+}
+
+/// Returns true for objects that NumPy converts to an array. NumPy converts points too, but documents have
+/// their fields.
+pub(crate) fn is_array_like(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(value.hasattr("__array__")? && !value.hasattr("TANGENT")?)
 }
 
 /// Reads an argument as finite numbers. `None` in `shape` accepts any length. An array with different axes,

@@ -1,11 +1,12 @@
 //! Fields of many factors or values at once: arrays have one row per item, everything else is shared.
-use super::arrays::{Numbers, any_numbers};
-use super::node::{array_node, node, number, within};
+use super::arrays::{Numbers, any_numbers, array_like};
+use super::node::{Untagged, array_node, node, number, within};
+use crate::chosen::{Chosen, What};
 use crate::errors::{self, Mistake};
 use manifactor::config::{Field, Node, Place, SourceText, Table, Value};
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyMapping};
 
 /// A document of one factor or value, with numbers that are filled in row by row. Only the parsed object is
 /// created for each row.
@@ -51,6 +52,19 @@ impl Columns {
     }
 }
 
+/// Returns fields as a dict.
+///
+/// # Errors
+/// If they are no mapping.
+pub(crate) fn dict_of<'py>(fields: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+    if let Ok(dict) = fields.cast::<PyDict>() {
+        return Ok(dict.clone());
+    }
+    let dict = PyDict::new(fields.py());
+    dict.update(fields.cast::<PyMapping>()?)?;
+    Ok(dict)
+}
+
 /// Replaces the numbers of a node.
 fn fill(node: &mut Node, numbers: &mut std::slice::Iter<'_, f64>, whole: bool) {
     match &mut node.value {
@@ -82,18 +96,23 @@ fn table(
         }
         let inner = within(path, &name);
         steps.push(table.len());
-        let node = if let Ok(array) = value.cast::<PyUntypedArray>() {
-            let numbers = column(what, rows, &inner, array)?;
+        let node = if what != "expression"
+            && let Ok(Chosen(What::Variable(shared))) = value.cast::<Chosen>().map(Bound::get)
+        {
+            // the field has one type; only constants of a formula name theirs
+            Untagged(shared.clone()).node(&place(&inner))?
+        } else if value.hasattr("__manifactor_columns__")? {
+            // an array of values
+            let fields = value.call_method0("__manifactor_columns__")?;
+            self::table(what, rows, &inner, fields.cast()?, steps, columns)?
+        } else if let Some(array) = array_like(what, &inner, &value)? {
+            let numbers = column(what, rows, &inner, &array)?;
             let shape = numbers.shape.get(1..).unwrap_or_default();
             let node = array_node(&place(&inner), shape, numbers.row(0), numbers.whole);
             columns.push(Column { path: steps.clone(), numbers });
             node
         } else if let Ok(fields) = value.cast::<PyDict>() {
             self::table(what, rows, &inner, fields, steps, columns)?
-        } else if value.hasattr("__manifactor_columns__")? {
-            // an array of values
-            let fields = value.call_method0("__manifactor_columns__")?;
-            self::table(what, rows, &inner, fields.cast()?, steps, columns)?
         } else {
             node(what, &inner, &value)?
         };

@@ -1,5 +1,5 @@
 //! Conversion between Python values and nodes of a document.
-use super::arrays::{Numbers, any_numbers, array, frozen};
+use super::arrays::{Numbers, any_numbers, array, frozen, is_array_like};
 use super::serialized::serialized;
 use crate::errors;
 use manifactor::config::{Field, MAX_DEPTH, Node, Place, SourceText, Value};
@@ -189,12 +189,6 @@ fn nested<W: Location>(at: &W, value: &Bound<'_, PyAny>, depth: usize) -> Result
         return Err(at.wrong(format_args!("expected numbers, texts, lists, dicts or arrays, got {found}")));
     };
     Ok(Node::new(at.place(""), plain))
-}
-
-/// Returns true for objects that NumPy converts to an array, such as a `pandas.Series`. NumPy converts points
-/// too, but documents have their fields.
-fn is_array_like(value: &Bound<'_, PyAny>) -> PyResult<bool> {
-    Ok(value.hasattr("__array__")? && !value.hasattr("TANGENT")?)
 }
 
 /// Converts numbers to nested arrays.

@@ -202,3 +202,48 @@ def test_a_pose_graph_is_saved_as_g2o(tmp_path: Path) -> None:
     with pytest.raises(mf.GraphError, match="there is no variable `x2`"):
         mf.save(tmp_path / "other.g2o", graph, values)
     assert not (tmp_path / "other.g2o").exists()
+
+
+def test_columns_of_pandas_and_values_that_all_factors_share() -> None:
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"k": [0, 1, 2], "z": [10.0, 20.0, 30.0]})
+    graph, values = mf.Graph(), mf.Values()
+    graph.add_many(mf.range_se2_point2, [["a", "b"]] * 3, {"range": table["z"]})
+    assert [graph[i].factor.range for i in range(3)] == [10, 20, 30]
+    with pytest.raises(mf.ArgumentError, match="expected an array of 3 rows, one for each, got 2 rows"):
+        graph.add_many(mf.range_se2_point2, [["a", "b"]] * 3, {"range": table["z"][:2]})
+    values.insert_many(table["k"], mf.Point1, {"position": table[["z"]]})
+    assert values["x2"] == mf.Point1(position=[30])
+    step = mf.Se3.exp([0, 0, 0.1, 1, 0, 0])
+    graph.add_many(mf.between_se3, [[0, 1], [1, 2]], {"relative": step})
+    graph.add_many(mf.prior_se3, [0], {"value": step}, noise=np.float64(0.1))
+    assert graph[4].factor == mf.between_se3(relative=step) and graph[5].factor == mf.prior_se3(value=step)
+    # a number of NumPy is shared by all
+    graph.add_many(mf.range_se2_point2, [["a", "b"]] * 2, {"range": np.float32(2)})
+    assert graph[7].factor.range == 2
+
+
+def test_masked_entries_are_refused() -> None:
+    masked = np.ma.masked_greater(np.array([1.0, 2.0]), 1.5)
+    with pytest.raises(mf.ArgumentError, match="range: expected an array without masked entries"):
+        mf.Graph().add_many(mf.range_se2_point2, [["a", "b"]] * 2, {"range": masked})
+    with pytest.raises(mf.ArgumentError, match="position: expected an array without masked entries"):
+        mf.Point2(position=masked)
+    with pytest.raises(mf.ArgumentError, match="without masked entries"):
+        mf.Noise(sigmas=masked)
+    assert mf.Point2(position=np.ma.masked_greater([1.0, 2.0], 5)) == mf.Point2(position=[1, 2])
+
+
+def test_a_plain_condition_is_a_truth_value() -> None:
+    big = 3
+
+    def of(condition: Any) -> Any:
+        @mf.factor
+        def branch(a: mf.Point1) -> Any:
+            return mf.where(condition, a, 2 * a)
+
+        return branch().residual(mf.Point1(position=[2.0]))[0]
+
+    assert of(big > 2) == 2 and of(np.bool_(big < 2)) == 4
+    with pytest.raises(TypeError, match="expected a condition such as x < 1, got int"):
+        of(-2)

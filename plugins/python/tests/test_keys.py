@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+from collections import ChainMap
+from types import MappingProxyType
 from typing import Any
 
 import manifactor as mf
@@ -71,3 +74,79 @@ def test_graphs_add_up() -> None:
     assert len(graph) == 4 and graph.to_document(values) == both.to_document(values)
     graph += graph
     assert len(graph) == 8
+
+
+def test_numbers_of_the_type_object_have_their_prefix() -> None:
+    pandas = pytest.importorskip("pandas")
+    rows = pandas.DataFrame({"pose": [0, 0], "landmark": [1, 2]})
+    for table in (rows, rows.astype("Int64"), rows.astype(object)):
+        graph = mf.Graph()
+        graph.add_many(mf.range_se3_point3, table, {"range": np.ones(2)}, prefix=["x", "l"])
+        assert [graph[i].keys for i in range(2)] == [["x0", "l1"], ["x0", "l2"]]
+    values, points = mf.Values(), {"position": np.zeros((2, 1))}
+    values.insert_many(np.array([1, 2], dtype=object), mf.Point1, points, prefix="l")
+    values.insert_many(pandas.Series(["a", "b"]), mf.Point1, points)
+    assert values.keys() == ["l1", "l2", "a", "b"]
+    for texts in (np.array(["a1", "a2"]), np.array(["a1", 2], dtype=object), ["a1", "a2"]):
+        with pytest.raises(mf.ArgumentError, match="keys: expected whole numbers"):
+            values.insert_many(texts, mf.Point1, points, prefix="l")
+
+
+def test_large_numbers_are_not_rounded() -> None:
+    stamps = np.array([1700000000123456789, 2**62 + 1])
+    for of in (stamps, stamps.astype(np.uint64), stamps.astype(object), stamps[::-1][::-1]):
+        values = mf.Values()
+        values.insert_many(of, mf.Point1, {"position": np.zeros((2, 1))})
+        assert values.keys() == [f"x{stamp}" for stamp in stamps] and int(stamps[0]) in values
+    graph = mf.Graph()
+    graph.add_many("prior_point1", stamps[:, None], {"value": {"position": [0]}})
+    assert graph[1].keys == [f"x{stamps[1]}"]
+    with pytest.raises(mf.ArgumentError, match=r"expected whole numbers below 2\^63, got 18446744073709551615"):
+        values.insert_many(np.array([2**64 - 1], dtype=np.uint64), mf.Point1, {"position": np.zeros((1, 1))})
+
+
+@pytest.mark.parametrize("keys", [{"a", "b"}, frozenset({"a", "b"})])
+def test_a_set_has_no_order(keys: Any) -> None:
+    between = mf.between_point1(relative=mf.Point1(position=[1]))
+    for call in (
+        lambda: mf.FactorEntry(keys, between),
+        lambda: mf.Graph().add(keys, between),
+        lambda: mf.Graph().add_many(between, [keys]),
+        lambda: mf.Values().insert_many(keys, mf.Point1, {"position": np.zeros((2, 1))}),
+    ):
+        with pytest.raises(TypeError, match="set, which has no order"):
+            call()
+
+
+def test_covariances_of_no_keys_are_empty() -> None:
+    graph, values = chain()
+    solution = mf.solve(graph, values)
+    assert solution.covariances([]) == {} and len(solution.covariances()) == 3
+    # their order does not matter
+    assert set(solution.covariances({"x1", "x2"})) == {"x1", "x2"}  # type: ignore[arg-type]
+
+
+def test_values_of_any_mapping() -> None:
+    point = mf.Point1(position=[1])
+    values = mf.Values(MappingProxyType({"a": point}))
+    values.update(ChainMap({"b": point}, {"c": point}))
+    values.insert_many(["d"], mf.Point1, MappingProxyType({"position": [1]}))
+    graph = mf.Graph()
+    graph.add_many(mf.prior_point1, ["a"], ChainMap({"value": {"position": [1]}}))
+    assert set(values) == {"a", "b", "c", "d"} and len(graph) == 1
+    with pytest.raises(TypeError):
+        mf.Values([("a", point)])  # type: ignore[arg-type]
+
+
+def test_an_id_of_a_factor_is_pickled_with_its_smoother() -> None:
+    graph, values = chain()
+    smoother = mf.Smoother()
+    ids = smoother.push(graph, values)
+    smoother.update()
+    smoother, again = pickle.loads(pickle.dumps((smoother, ids)))
+    assert again == ids and len({*again, *ids}) == 3
+    smoother.remove(again[2:])
+    smoother.update()
+    assert len(smoother.graph()) == 2
+    with pytest.raises(mf.GraphError, match="there is no factor 2"):
+        smoother.remove(again[2:])
