@@ -20,6 +20,7 @@ use std::io::{self, BufReader, Cursor, Read};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
 
 /// Opens a document from a file, or from JSON instead, and applies overrides.
 fn open(config: &Path, json: Option<String>, set: &[String]) -> Result<Document, Diagnostics> {
@@ -65,7 +66,8 @@ fn run(
     done.map_err(|error: String| errors::solve(error))
 }
 
-/// Maps the frames of an iterable of lines, or of the source, one by one; see [`run`] for the result.
+/// Maps the frames of an iterable of lines, or of the source, one by one. Returns the result of [`run`], the
+/// number of rejected frames, and the error of the first one.
 #[pyfunction]
 #[pyo3(signature = (config, json, set, data, lines = None, on_frame = None))]
 fn online(
@@ -76,14 +78,16 @@ fn online(
     data: Option<PathBuf>,
     lines: Option<Py<PyAny>>,
     on_frame: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Told> {
-    let mut frames = Frames { watch: Watch::new(on_frame), objects: ObjectUpdates::default() };
+) -> PyResult<(Told, usize, Option<String>)> {
+    let watch = Watch::new(on_frame);
+    let mut frames = Frames { watch, objects: ObjectUpdates::default(), rejected: 0, first: None };
+    let raised = Raised::default();
     let read = open(&config, json, &set).and_then(|document| RunDocument::read(&document));
     let document = read.map_err(|error| errors::document(&error))?;
     let done = detach(py, || {
         let mut run = Run::new(&document, data);
         if let Some(lines) = lines {
-            let lines = PythonLines { lines, pending: Cursor::default() };
+            let lines = PythonLines { lines, pending: Cursor::default(), raised: raised.clone() };
             run.read_frames_from("frames", Box::new(BufReader::new(lines)));
         }
         let online = |variant: &RunVariant, run: &mut Run<'_>| {
@@ -92,7 +96,11 @@ fn online(
         report_of(run, &document, online)
     })?;
     frames.watch.finish()?;
-    done.map_err(|error: String| errors::solve(error))
+    if let Some(error) = raised.lock().ok().and_then(|mut raised| raised.take()) {
+        return Err(error);
+    }
+    let told = done.map_err(|error: String| errors::solve(error))?;
+    Ok((told, frames.rejected, frames.first))
 }
 
 /// Runs all variants of a document, and returns their results.
@@ -114,10 +122,14 @@ fn report_of(
     Ok((json(told)?, json(table)?, json(serde_json::to_string(&record))?, page))
 }
 
+/// An exception of an iterator, which may be read on another thread.
+type Raised = Arc<Mutex<Option<PyErr>>>;
+
 /// Lines of a Python iterator. An exception ends them, and is raised after the run.
 struct PythonLines {
     lines: Py<PyAny>,
     pending: Cursor<Vec<u8>>,
+    raised: Raised,
 }
 
 impl Read for PythonLines {
@@ -135,7 +147,9 @@ impl Read for PythonLines {
                 Ok(None) => return Ok(0),
                 Ok(Some(line)) => self.pending = Cursor::new((line + "\n").into_bytes()),
                 Err(error) => {
-                    crate::raised::store_exception(error);
+                    if let Ok(mut raised) = self.raised.lock() {
+                        raised.get_or_insert(error);
+                    }
                     return Err(io::Error::other("the frames raised an exception"));
                 }
             }
@@ -147,6 +161,9 @@ impl Read for PythonLines {
 struct Frames {
     watch: Watch,
     objects: ObjectUpdates,
+    /// Number of rejected frames, and the error of the first one.
+    rejected: usize,
+    first: Option<String>,
 }
 
 impl StreamWatcher for Frames {
@@ -156,6 +173,10 @@ impl StreamWatcher for Frames {
                 self.watch.poll()
             }
             StreamEvent::Frame(MappedFrame { report, mapper, seconds, .. }) => {
+                if let Err(error) = report {
+                    self.rejected += 1;
+                    self.first.get_or_insert_with(|| error.to_string());
+                }
                 self.watch.call(&match report {
                     Ok(report) => {
                         json!({ "seconds": seconds, "report": report, "map": self.objects.take(mapper) })

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import os
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from .chosen import Variable
 from .errors import ExistsError, Mistake
 
 #: A file, or the content of one.
@@ -139,6 +141,8 @@ def overrides(values: Mapping[str, Any] | Sequence[str]) -> list[str]:
 def toml(value: Any) -> str:
     """Formats a value as TOML."""
     match value:
+        case np.generic():
+            return toml(value.item())
         case bool():
             return "true" if value else "false"
         case int() | float():
@@ -198,11 +202,16 @@ def online(
     `frames` are dicts or lines of JSON in the form of `manifactor schema frame`, for a document whose source is
     `json_lines`. Default: the frames of the source. `on_frame` is called after each frame with a dict: the `report` of the
     frame, with its pose and the objects of its boxes; in `map`, the objects that have changed; or the `error` of a frame
-    that was rejected. It ends the stream by returning `False`. `set` and `data` are those of :func:`run`.
+    that was rejected. It ends the stream by returning `False`. Without `on_frame`, a warning has the number of
+    rejected frames. `set` and `data` are those of :func:`run`.
     """
     path, text = opened(config, "run")
-    lines = None if frames is None else (frame if isinstance(frame, str) else json.dumps(frame, default=plain) for frame in frames)
-    report, table, record, page = _native.online(path, text, overrides(set), data_folder(data), lines, on_frame)
+    lines = None if frames is None else (frame if isinstance(frame, str) else json.dumps(frame, default=part_of_frame) for frame in frames)
+    told, rejected, first = _native.online(path, text, overrides(set), data_folder(data), lines, on_frame)
+    if rejected and on_frame is None:
+        frames_were = "frame was" if rejected == 1 else "frames were"
+        warnings.warn(f"{rejected} {frames_were} rejected, the first: {first}", stacklevel=2)
+    report, table, record, page = told
     return Report(json.loads(report), json.loads(table), json.loads(record), page)
 
 
@@ -211,6 +220,12 @@ def plain(value: Any) -> Any:
     if hasattr(value, "to_dict"):
         return value.to_dict()
     return value.tolist() if hasattr(value, "tolist") else os.fspath(value)
+
+
+def part_of_frame(value: Any) -> Any:
+    """Converts a part of a frame for JSON. The fields of frames have fixed types, which values do not repeat."""
+    fields = plain(value)
+    return {name: item for name, item in fields.items() if name != "type"} if isinstance(value, Variable) else fields
 
 
 class Summary:

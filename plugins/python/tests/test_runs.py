@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -181,3 +182,40 @@ def test_a_stream_ends_with_its_function_or_an_exception() -> None:
         mf.online(LIVE, broken())
     with pytest.raises(mf.SolveError, match="need `source.type = \"json_lines\"`, got `simulated`"):
         mf.online({"source": {"type": "simulated"}}, frames_of_a_ball())
+
+
+def test_numbers_of_numpy_change_a_document() -> None:
+    for frames in (np.int64(8), np.int32(8), np.uint8(8)):
+        report = mf.run(DESK, set={"source.trajectory.frames": frames, "detections.noise.sigma": np.float64(0.5)})
+        assert len(report[0].trajectory()) == 8
+
+
+def test_rejected_frames_are_a_warning() -> None:
+    frames = list(frames_of_a_ball())
+    with pytest.warns(UserWarning, match="2 frames were rejected, the first: .*line 4"):
+        mf.online(LIVE, [*frames[:3], {"pose": None}, "{", *frames[3:]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mf.online(LIVE, frames)
+
+
+def test_a_pose_of_a_frame_may_be_a_value() -> None:
+    def frames() -> Iterator[dict[str, Any]]:
+        for frame in frames_of_a_ball():
+            yield {**frame, "pose": mf.Se3(**frame["pose"])}
+
+    updates: list[dict[str, Any]] = []
+    report = mf.online(LIVE, frames(), on_frame=updates.append)
+    assert report[0].report["counts"]["frames"] == 20 and not any("error" in update for update in updates)
+
+
+def test_logging_may_be_enabled_twice() -> None:
+    code = (
+        "import logging, warnings, manifactor as mf\n"
+        "mf.enable_logging(); mf.enable_logging(logging.WARNING)\n"
+        "warnings.simplefilter('error')\n"
+        "try: mf.enable_logging(logging.DEBUG)\n"
+        "except UserWarning as warning: print(warning)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0 and "below the level 20" in done.stdout, done.stderr
