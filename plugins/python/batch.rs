@@ -5,6 +5,7 @@
 //! are central differences in the tangent space, whose points are evaluated in a single call.
 mod cached;
 mod evaluate;
+mod memory;
 mod whole;
 
 use crate::errors;
@@ -95,6 +96,12 @@ impl ErasedResidual for Batched {
     fn autodiff(&self, variables: &[&dyn Variable]) -> Option<Linearization> {
         ErasedResidual::linearize(self, variables)
     }
+}
+
+/// Returns the address of a factor's Python function, which identifies it; `None` for other factors.
+pub(crate) fn function_address(factor: &dyn Factor) -> Option<usize> {
+    let batched = factor.erased().as_any().downcast_ref::<Batched>()?;
+    Some(Arc::as_ptr(batched.function()).addr())
 }
 
 /// A Python function with the types of its variables, from which factors are made.

@@ -347,7 +347,6 @@ fn linearize<'py>(
         let message = format!("`{}` does not take ({})", of.typetag_name(), types.join(", "));
         return Err(errors::argument("linearize", "variables", message));
     };
-    crate::raised::raise()?;
     let by_rows = |m: &manifactor::nalgebra::DMatrix<f64>| {
         to_array(py, &[m.nrows(), m.ncols()], m.transpose().as_slice().to_vec())
     };
@@ -400,7 +399,6 @@ fn check_factor<'py>(
         subject.around = around.iter().map(|x| x.erased().clone_box()).collect();
     }
     let report = detach(py, || FactorCheck { points, seed, ..FactorCheck::default() }.run(&subject))?;
-    crate::raised::raise()?;
     Ok((report.holds(), report.to_string(), to_python(py, &report)?))
 }
 

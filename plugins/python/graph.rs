@@ -7,7 +7,7 @@ mod values;
 
 use crate::chosen::{factor, known, loss};
 use crate::errors;
-use crate::input::{Columns, key_of, key_rows, keys};
+use crate::input::{Columns, dict_of, key_of, key_rows, keys};
 use crate::threads::detach;
 use entry::Options;
 use manifactor::graph::catalogue::find;
@@ -86,7 +86,7 @@ impl Graph {
         &mut self,
         factor: &Bound<'_, PyAny>,
         keys: &Bound<'_, PyAny>,
-        fields: Option<&Bound<'_, PyDict>>,
+        fields: Option<&Bound<'_, PyAny>>,
         prefix: Option<&Bound<'_, PyAny>>,
         noise: Option<&Bound<'_, PyAny>>,
         loss: Option<&Bound<'_, PyAny>>,
@@ -95,7 +95,8 @@ impl Graph {
         let rows = keys.len() / width.max(1);
         let loss = loss.map(|loss| self::loss("loss", loss)).transpose()?;
         let mut noises = noise::Rows::new("add_many", rows, noise)?;
-        let mut factors = Factors::new(factor, rows, fields)?;
+        let fields = fields.map(dict_of).transpose()?;
+        let mut factors = Factors::new(factor, rows, fields.as_ref())?;
         let (first, graph) = (self.0.factors().len(), self.0.change("graph")?);
         // all factors are added or none
         let mut entries = Vec::with_capacity(rows);
@@ -184,16 +185,15 @@ impl Graph {
     }
 
     /// Returns all errors of the graph with these values; empty if it can be solved.
-    fn check(&self, py: Python<'_>, values: PyRef<'_, Values>) -> PyResult<Vec<String>> {
-        let (graph, values) = (&*self.0, &*values.0);
-        detach(py, || graph.check(values).iter().map(ToString::to_string).collect())
+    fn check(slf: &Bound<'_, Self>, values: &Bound<'_, Values>) -> PyResult<Vec<String>> {
+        let (graph, values) = (snapshot(slf)?, values.try_borrow()?.0.snapshot());
+        detach(slf.py(), || graph.check(&values).iter().map(ToString::to_string).collect())
     }
 
     /// Returns the cost ½ Σ ρ(‖r‖²) at these values. Factors that are undefined there do not count.
-    fn cost(&self, py: Python<'_>, values: PyRef<'_, Values>) -> PyResult<f64> {
-        let (graph, values) = (&*self.0, &*values.0);
-        let cost = detach(py, || graph.cost(values))?;
-        crate::raised::raise()?;
+    fn cost(slf: &Bound<'_, Self>, values: &Bound<'_, Values>) -> PyResult<f64> {
+        let (graph, values) = (snapshot(slf)?, values.try_borrow()?.0.snapshot());
+        let cost = detach(slf.py(), || graph.cost(&values))?;
         cost.map_err(|found| files::misfit(&found))
     }
 
@@ -213,8 +213,9 @@ impl Graph {
     /// Returns the graph and its values as a document in `toml`, `json` or `yaml`, which `manifactor solve`
     /// reads.
     #[pyo3(signature = (values, format = "toml"))]
-    fn to_document(&self, py: Python<'_>, values: PyRef<'_, Values>, format: &str) -> PyResult<String> {
-        document(py, &self.0, &values.0, format)
+    fn to_document(slf: &Bound<'_, Self>, values: &Bound<'_, Values>, format: &str) -> PyResult<String> {
+        let values = values.try_borrow()?.0.snapshot();
+        document(slf.py(), &*snapshot(slf)?, &values, format)
     }
 
     fn __len__(&self) -> usize {
@@ -280,6 +281,12 @@ impl Graph {
         }
         types
     }
+}
+
+/// Returns the current content of a graph. The borrow ends, so that other threads may change the graph while
+/// the core reads it.
+fn snapshot(graph: &Bound<'_, Graph>) -> PyResult<Arc<Inner>> {
+    Ok(graph.try_borrow()?.0.snapshot())
 }
 
 /// A class, its arguments, and a state, from which `pickle` creates an object.
@@ -399,11 +406,6 @@ fn read(name: &str, columns: &mut Columns, row: usize) -> PyResult<Arc<dyn Facto
     let entry = find("factor", name).ok_or_else(|| errors::internal(name))?;
     let read = entry.read::<dyn Factor>(columns.row(row));
     read.map(Arc::from).map_err(|error| errors::row(name, row, &error, "fields"))
-}
-
-/// Returns the keys in a text or a list; empty for `None`.
-pub(crate) fn optional_keys(what: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Key>> {
-    value.map_or(Ok(vec![]), |value| keys(what, value))
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

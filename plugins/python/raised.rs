@@ -1,26 +1,31 @@
-//! Exceptions of Python functions within a solve. They end the solve and are raised after it.
+//! Exceptions of Python functions within a call of the core. They end the call and are raised after it.
 use pyo3::prelude::*;
-use std::sync::Mutex;
+use std::cell::RefCell;
 
-/// The first exception of a Python function since the last call of [`raise`].
-static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
+thread_local! {
+    /// The first exception of a Python function within the innermost [`catch`] of this thread. The core
+    /// evaluates the factors of Python functions on the thread of the call, so threads do not share it.
+    static RAISED: RefCell<Option<PyErr>> = const { RefCell::new(None) };
+}
 
-/// Returns whether a Python function has raised an exception since [`raise`] was called.
+/// Runs work that may evaluate factors of Python functions.
+///
+/// # Errors
+/// The first exception of such a function. Calls within a function have separate exceptions.
+pub(crate) fn catch<T>(work: impl FnOnce() -> T) -> PyResult<T> {
+    let outer = RAISED.take();
+    let done = work();
+    RAISED.replace(outer).map_or(Ok(done), Err)
+}
+
+/// Returns whether a Python function has raised an exception within the innermost [`catch`].
 pub(crate) fn has_raised() -> bool {
-    RAISED.lock().is_ok_and(|raised| raised.is_some())
+    RAISED.with_borrow(Option::is_some)
 }
 
-/// Raises the stored exception, if there is one.
-pub(crate) fn raise() -> PyResult<()> {
-    match RAISED.lock().ok().and_then(|mut raised| raised.take()) {
-        Some(error) => Err(error),
-        None => Ok(()),
-    }
-}
-
-/// Stores an exception until the solve has ended; only the first one is kept.
+/// Stores an exception until the call has ended; only the first one is kept.
 pub(crate) fn store_exception(error: PyErr) {
-    if let Ok(mut raised) = RAISED.lock() {
+    RAISED.with_borrow_mut(|raised| {
         raised.get_or_insert(error);
-    }
+    });
 }

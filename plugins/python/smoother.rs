@@ -1,10 +1,13 @@
 //! A graph that grows while it is solved.
+mod functions;
+
 use crate::chosen::{What, solver};
 use crate::errors;
 use crate::graph::{Graph, Shared, Values};
-use crate::input::{key_of, keys, node, to_array, to_python};
+use crate::input::{key_of, keys, node, to_array, to_python, unordered_keys};
 use crate::solution::Watch;
 use crate::threads::detach;
+use functions::Functions;
 use manifactor::config::Errors;
 use manifactor::graph::Key;
 use manifactor::smoother::{FactorId as InnerId, Smoother as Inner, SmootherSettings};
@@ -15,9 +18,20 @@ use pyo3::types::PyDict;
 use std::sync::Arc;
 
 /// The id of a factor in a smoother.
-#[pyclass(module = "manifactor", frozen, eq, hash)]
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) struct FactorId(InnerId);
+#[pyclass(module = "manifactor", frozen)]
+#[derive(Clone, Copy)]
+pub(crate) struct FactorId {
+    number: u32,
+    /// The id in the core; `None` after unpickling, because only a smoother makes ids.
+    inner: Option<InnerId>,
+}
+
+impl FactorId {
+    fn of(id: InnerId) -> PyResult<Self> {
+        let number = id.to_string().parse().map_err(errors::internal)?;
+        Ok(Self { number, inner: Some(id) })
+    }
+}
 
 #[pymethods]
 impl FactorId {
@@ -29,15 +43,54 @@ impl FactorId {
         *self
     }
 
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| other.get().number == self.number)
+    }
+
+    fn __hash__(&self) -> isize {
+        self.number as isize
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (u32,))> {
+        Ok((slf.get_type().getattr("_unpickle")?, (slf.get().number,)))
+    }
+
+    #[staticmethod]
+    #[pyo3(name = "_unpickle")]
+    fn unpickle(number: u32) -> Self {
+        Self { number, inner: None }
+    }
+
     fn __repr__(&self) -> String {
-        format!("FactorId({})", self.0)
+        format!("FactorId({})", self.number)
     }
 }
 
 /// An incremental smoother: variables and factors are added and removed, and `update` recomputes the
 /// estimate.
 #[pyclass(module = "manifactor")]
-pub(crate) struct Smoother(Inner);
+pub(crate) struct Smoother {
+    inner: Inner,
+    functions: Functions,
+}
+
+impl Smoother {
+    /// Returns ids of the core.
+    fn ids(&self, factors: &[Py<FactorId>]) -> PyResult<Vec<InnerId>> {
+        let known = match factors.iter().all(|id| id.get().inner.is_some()) {
+            true => vec![],
+            false => self.inner.graph().1.into_iter().map(FactorId::of).collect::<PyResult<_>>()?,
+        };
+        let id = |id: &Py<FactorId>| {
+            let id = *id.get();
+            let same = || known.iter().find(|known| known.number == id.number)?.inner;
+            id.inner.or_else(same).ok_or_else(|| {
+                errors::graph(format_args!("there is no factor {} in this smoother", id.number))
+            })
+        };
+        factors.iter().map(id).collect()
+    }
+}
 
 #[pymethods]
 impl Smoother {
@@ -54,72 +107,84 @@ impl Smoother {
             }
             None => SmootherSettings::default(),
         };
-        Ok(Self(Inner::new(settings)))
+        Ok(Self { inner: Inner::new(settings), functions: Functions::default() })
     }
 
     /// Adds variables with their initial values, and factors between new or existing variables; variables
     /// that the graph fixes are fixed. Takes effect at the next update. Returns the ids of the factors, in
     /// order. After an error, nothing is added.
-    fn push(&mut self, graph: PyRef<'_, Graph>, values: PyRef<'_, Values>) -> PyResult<Vec<FactorId>> {
-        let ids = self.0.push(&graph.0, &values.0).map_err(errors::graph)?;
-        Ok(ids.into_iter().map(FactorId).collect())
+    fn push(
+        &mut self,
+        py: Python<'_>,
+        graph: &Bound<'_, Graph>,
+        values: &Bound<'_, Values>,
+    ) -> PyResult<Vec<FactorId>> {
+        let Self { inner, functions } = self;
+        let (graph, values) = (graph.try_borrow()?.0.snapshot(), values.try_borrow()?.0.snapshot());
+        let ids = detach(py, || {
+            let ids = inner.push(&graph, &values).map_err(|error| error.to_string())?;
+            functions.add(&graph, &ids);
+            Ok(ids)
+        })?;
+        ids.map_err(|error: String| errors::graph(error))?.into_iter().map(FactorId::of).collect()
     }
 
     /// Removes factors at the next update.
     fn remove(&mut self, factors: Vec<Py<FactorId>>) -> PyResult<()> {
-        let ids: Vec<InnerId> = factors.iter().map(|id| id.get().0).collect();
-        self.0.remove(&ids).map_err(errors::graph)
+        let ids = self.ids(&factors)?;
+        self.inner.remove(&ids).map_err(errors::graph)
     }
 
     /// Marginalizes variables at the next update: their information stays as a linear prior.
     fn marginalize(&mut self, keys: &Bound<'_, PyAny>) -> PyResult<()> {
-        let keys = self::keys("marginalize", keys)?;
-        self.0.marginalize(&keys).map_err(errors::graph)
+        let keys = unordered_keys("marginalize", keys)?;
+        self.inner.marginalize(&keys).map_err(errors::graph)
     }
 
     /// Sets the time of the next factors and variables, for a window by time. Unit: seconds.
     fn set_time(&mut self, seconds: f64) -> PyResult<()> {
-        self.0.set_time(seconds).map_err(errors::graph)
+        self.inner.set_time(seconds).map_err(errors::graph)
     }
 
     /// Applies the changes, and updates the estimate. Returns a report: `redone`, `relinearized`, `parked`,
-    /// `undetermined` and so on. After an error, the smoother is unchanged.
+    /// `undetermined` and so on. After an error, the smoother is unchanged. If a Python function raises an
+    /// exception only at a new point of an old factor, the factor keeps its last linearization, and the
+    /// changes are applied.
     fn update<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let inner = &mut self.0;
+        let Self { inner, functions } = self;
+        // the exceptions of the test are raised before anything changes
+        detach(py, || functions.test(inner))?;
         let report = detach(py, || inner.update().map_err(|error| error.to_string()))?;
-        crate::raised::raise()?;
         to_python(py, &report.map_err(errors::solve)?)
     }
 
     /// The estimate of a variable after the last update.
     fn __getitem__<'py>(&self, py: Python<'py>, key: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let key = key_of("Smoother", key)?;
-        match self.0.estimate(key.as_str()) {
+        match self.inner.estimate(key.as_str()) {
             Some(value) => What::Variable(value.into()).into_python(py),
             None => Err(pyo3::exceptions::PyKeyError::new_err(format!("there is no variable `{key}`"))),
         }
     }
 
     fn __contains__(&self, key: &Bound<'_, PyAny>) -> bool {
-        key_of("Smoother", key).is_ok_and(|key| self.0.estimate(key.as_str()).is_some())
+        key_of("Smoother", key).is_ok_and(|key| self.inner.estimate(key.as_str()).is_some())
     }
 
     fn __len__(&self) -> usize {
-        self.0.variables()
+        self.inner.variables()
     }
 
     /// All estimates, in the order of insertion.
     #[getter]
     fn values(&self, py: Python<'_>) -> PyResult<Values> {
-        Ok(Values(Shared::of("smoother", detach(py, || self.0.estimates())?)))
+        Ok(Values(Shared::of("smoother", detach(py, || self.inner.estimates())?)))
     }
 
     /// Returns ½ Σ ρ at the estimate. The time is linear in the number of factors.
     fn cost(&mut self, py: Python<'_>) -> PyResult<f64> {
-        let inner = &mut self.0;
-        let cost = detach(py, || inner.cost())?;
-        crate::raised::raise()?;
-        Ok(cost)
+        let inner = &mut self.inner;
+        detach(py, || inner.cost())
     }
 
     /// Returns the joint covariance of a few variables, in the order of `keys` and of their tangent
@@ -131,19 +196,20 @@ impl Smoother {
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let keys = self::keys("covariance", keys)?;
         let names: Vec<&str> = keys.iter().map(Key::as_str).collect();
-        let joint = detach(py, || self.0.covariance(&names).map_err(|error| error.to_string()))?;
+        let joint = detach(py, || self.inner.covariance(&names).map_err(|error| error.to_string()))?;
         let joint = joint.map_err(errors::solve)?;
         to_array(py, &[joint.nrows(), joint.ncols()], joint.as_slice().to_vec())
     }
 
     /// Returns the factors rejected as outliers, each with its cost and the update that rejected it.
     fn rejections<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        to_python(py, &self.0.rejections())
+        let inner = &mut self.inner;
+        to_python(py, &detach(py, || inner.rejections())?)
     }
 
     /// Returns the active factors as a graph, with its fixed variables.
     fn graph(&self) -> Graph {
-        Graph(self.0.graph().0.into())
+        Graph(self.inner.graph().0.into())
     }
 
     /// Solves the whole graph as one batch from the estimate, and returns the values and the report of the
@@ -157,7 +223,8 @@ impl Smoother {
         let solver: Arc<dyn Optimizer> =
             solver.map_or_else(|| Ok(Arc::new(Auto::default()) as _), |s| self::solver("solver", s))?;
         let mut watch = Watch::new(None);
-        let finished = detach(py, || self.0.finish(&*solver, &mut watch).map_err(|error| error.to_string()))?;
+        let finished =
+            detach(py, || self.inner.finish(&*solver, &mut watch).map_err(|error| error.to_string()))?;
         watch.finish()?;
         let finished = finished.map_err(errors::graph)?;
         Ok((Values(finished.values.into()), to_python(py, &finished.outcome)?))
@@ -165,14 +232,16 @@ impl Smoother {
 
     /// Returns the smoother as a text. `Smoother.load` restores it bit for bit.
     fn save(&self, py: Python<'_>) -> PyResult<String> {
-        detach(py, || self.0.save().map_err(|error| error.to_string()))?.map_err(errors::solve)
+        detach(py, || self.inner.save().map_err(|error| error.to_string()))?.map_err(errors::solve)
     }
 
     /// Restores a saved smoother.
     #[staticmethod]
     fn load(py: Python<'_>, text: &str) -> PyResult<Self> {
         let loaded = detach(py, || Inner::load(text).map_err(|error| error.to_string()))?;
-        loaded.map(Self).map_err(|error| errors::argument("Smoother.load", "text", error))
+        let inner = loaded.map_err(|error| errors::argument("Smoother.load", "text", error))?;
+        // a saved smoother has no factors of Python functions
+        Ok(Self { inner, functions: Functions::default() })
     }
 
     /// Logs the smoother in the rerun viewer, or to a `.rrd` file, update by update. Call `push` and
@@ -192,6 +261,6 @@ impl Smoother {
     }
 
     fn __repr__(&self) -> String {
-        format!("{:?}", self.0)
+        format!("{:?}", self.inner)
     }
 }

@@ -3,7 +3,7 @@ mod account;
 
 use crate::chosen::{solver, start};
 use crate::errors;
-use crate::graph::{Graph, Shared, Values, html, optional_keys};
+use crate::graph::{Graph, Shared, Values, html};
 use crate::input::{frozen, json_to_python, to_array, to_python};
 use crate::threads::detach;
 use account::{Account, State, parsed, restored};
@@ -32,8 +32,7 @@ impl Watch {
 
     /// Raises the exception that ended the solve, if there is one.
     pub(crate) fn finish(self) -> PyResult<()> {
-        self.raised.map_or(Ok(()), Err)?;
-        crate::raised::raise()
+        self.raised.map_or(Ok(()), Err)
     }
 
     /// Calls the function with a value as Python objects. It ends the work by returning `False`.
@@ -92,8 +91,8 @@ pub(crate) struct Solution {
 #[pyo3(signature = (graph, values, solver = None, *, start = None, observer = None))]
 fn solve(
     py: Python<'_>,
-    graph: PyRef<'_, Graph>,
-    values: PyRef<'_, Values>,
+    graph: &Bound<'_, Graph>,
+    values: &Bound<'_, Values>,
     solver: Option<&Bound<'_, PyAny>>,
     start: Option<&Bound<'_, PyAny>>,
     observer: Option<&Bound<'_, PyAny>>,
@@ -103,7 +102,8 @@ fn solve(
     let start: Arc<dyn Start> =
         start.map_or_else(|| Ok(Arc::new(GivenStart::default()) as _), |s| self::start("start", s))?;
     let mut watch = Watch::new(observer);
-    let (graph, values) = (graph.0.snapshot(), values.0.snapshot());
+    // other threads and the observer may change both meanwhile
+    let (graph, values) = (graph.try_borrow()?.0.snapshot(), values.try_borrow()?.0.snapshot());
     let solved = detach(py, || {
         let values = start.initial_values(&graph, &values).map_err(|error| error.to_string())?;
         solve_inner(&graph, &values, &*solver, &mut watch).map_err(|error| error.to_string())
@@ -202,11 +202,15 @@ impl Solution {
         py: Python<'py>,
         keys: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let keys = optional_keys("covariances", keys)?;
-        let names: Vec<&str> = keys.iter().map(Key::as_str).collect();
+        let dict = PyDict::new(py);
+        let keys = keys.map(|keys| crate::input::unordered_keys("covariances", keys)).transpose()?;
+        if keys.as_ref().is_some_and(Vec::is_empty) {
+            return Ok(dict);
+        }
+        // the core returns all marginals if there are no names
+        let names: Vec<&str> = keys.iter().flatten().map(Key::as_str).collect();
         let marginals =
             detach(py, || self.inner.marginals(&self.graph, &names).map_err(|error| error.to_string()))?;
-        let dict = PyDict::new(py);
         for marginal in marginals.map_err(errors::solve)? {
             let n = marginal.covariance.nrows();
             dict.set_item(

@@ -4,7 +4,6 @@
 //! that waits for the pool never ends. If a process was forked after its parent has computed, each calling
 //! thread gets a pool with one thread.
 use pyo3::exceptions::PyRuntimeWarning;
-use pyo3::marker::Ungil;
 use pyo3::prelude::*;
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -19,13 +18,15 @@ thread_local! {
     static IS_ALONE: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Computes without the interpreter's lock, on threads of this process.
+/// Computes without the interpreter's lock, on threads of this process. All calls that may evaluate factors of
+/// Python functions pass through here.
 ///
 /// # Errors
-/// If the user turns the warning into an error, or if the pool cannot be built.
-pub(crate) fn detach<T: Ungil>(py: Python<'_>, work: impl Ungil + FnOnce() -> T) -> PyResult<T> {
+/// If a Python function raises an exception, if the user turns the warning into an error, or if the pool
+/// cannot be built.
+pub(crate) fn detach<T: Send>(py: Python<'_>, work: impl Send + FnOnce() -> T) -> PyResult<T> {
     prepare(py)?;
-    Ok(py.detach(work))
+    py.detach(|| crate::raised::catch(work))
 }
 
 /// Gives the calling thread a pool of one thread if the threads of the global pool belong to another

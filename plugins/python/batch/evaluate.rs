@@ -1,7 +1,7 @@
 //! Calls of a Python function, for many points at once.
 use crate::errors;
 use crate::input::{numbers_or_nan, to_array};
-use crate::raised::store_exception;
+use crate::raised::{has_raised, store_exception};
 use manifactor::graph::Variable;
 use manifactor::graph::quantity::VariableQuantity;
 use pyo3::prelude::*;
@@ -57,16 +57,18 @@ impl Function {
         Self { name, quantities, types, dimensions, rows, constants, evaluate, has_jacobian }
     }
 
+    /// Returns the numbers of a point's variables, concatenated.
+    pub(super) fn numbers(&self, point: &Point) -> Vec<f64> {
+        Inputs::new(self, std::slice::from_ref(point)).variables.concat()
+    }
+
     /// Returns the residuals of these points, concatenated; NaN if Python has raised an exception.
     pub(super) fn residuals(&self, points: &[Point]) -> Vec<f64> {
         let mut all = Vec::with_capacity(points.len() * self.rows);
         for points in points.chunks(MOST) {
-            match self.call(Inputs::new(self, points), false) {
-                Ok((residuals, _)) => all.extend(residuals),
-                Err(error) => {
-                    store_exception(error);
-                    all.resize(all.len() + points.len() * self.rows, f64::NAN);
-                }
+            match unless_raised(|| self.call(Inputs::new(self, points), false)) {
+                Some((residuals, _)) => all.extend(residuals),
+                None => all.resize(all.len() + points.len() * self.rows, f64::NAN),
             }
         }
         all
@@ -79,9 +81,11 @@ impl Function {
             (vec![], sizes.clone().map(|size| Vec::with_capacity(size * points.len())).collect());
         let each = if self.has_jacobian { 1 } else { 1 + 2 * self.dimensions.iter().sum::<usize>() };
         for points in points.chunks((MOST / each).max(1)) {
-            let done = if self.has_jacobian { self.by_python(points) } else { self.by_differences(points) };
-            let (residuals, blocks) = done.unwrap_or_else(|error| {
-                store_exception(error);
+            let done = unless_raised(|| match self.has_jacobian {
+                true => self.by_python(points),
+                false => self.by_differences(points),
+            });
+            let (residuals, blocks) = done.unwrap_or_else(|| {
                 let nothing = |size: usize| vec![f64::NAN; size * points.len()];
                 (nothing(self.rows), sizes.clone().map(nothing).collect())
             });
@@ -185,6 +189,14 @@ impl Function {
             Ok((residuals, sizes.iter().zip(&jacobians).map(block).collect::<PyResult<_>>()?))
         })
     }
+}
+
+/// Calls a function unless an exception was raised before; an exception is stored.
+fn unless_raised<T>(call: impl FnOnce() -> PyResult<T>) -> Option<T> {
+    if has_raised() {
+        return None;
+    }
+    call().map_err(store_exception).ok()
 }
 
 /// Reads numbers that a function has returned. Rows of NaN mean that the factor is undefined there.

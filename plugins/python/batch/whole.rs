@@ -1,7 +1,9 @@
 //! A batch of factors that are evaluated in one call.
 use super::Batched;
 use super::cached::{Cached, Results};
-use super::evaluate::{Function, Point};
+use super::evaluate::{Function, Linearized, Point};
+use super::memory::Memory;
+use crate::raised::has_raised;
 use manifactor::graph::batch::{Batch, Evaluation, FactorRows, FactorState, Member};
 use manifactor::graph::column::Columns;
 use manifactor::graph::loss::Loss;
@@ -27,6 +29,9 @@ struct One {
     number: usize,
     constants: Arc<[f64]>,
     index: Vec<u32>,
+    /// Index in the graph.
+    entry: usize,
+    memory: Memory,
 }
 
 impl Whole {
@@ -52,28 +57,54 @@ impl Whole {
             None => self.members.iter().collect(),
         };
         let points: Vec<Point> = chosen.iter().map(|one| self.point(one, columns)).collect();
-        let rows = self.function.rows;
-        let (residuals, blocks) = match derivatives {
+        let done = match derivatives {
             true => self.function.linearized(&points),
             false => (self.function.residuals(&points), vec![]),
         };
+        let numbers: Vec<usize> = chosen.iter().map(|one| one.number).collect();
+        self.publish(&numbers, &done);
+    }
+
+    /// Makes results readable for the factors with these indices. Blocks may be missing.
+    fn publish(&self, numbers: &[usize], (residuals, blocks): &Linearized) {
         let Ok(mut results) = self.results.write() else { return };
-        let count = self.numbers;
+        let (count, rows) = (self.numbers, self.function.rows);
         let put = |to: &mut Vec<f64>, from: &[f64], size: usize| {
             to.resize(count * size, f64::NAN);
-            for (one, from) in chosen.iter().zip(from.chunks_exact(size.max(1))) {
-                if let Some(to) = to.get_mut(one.number * size..(one.number + 1) * size) {
+            for (number, from) in numbers.iter().zip(from.chunks_exact(size.max(1))) {
+                if let Some(to) = to.get_mut(number * size..(number + 1) * size) {
                     to.copy_from_slice(from);
                 }
             }
         };
-        put(&mut results.0, &residuals, rows);
-        if derivatives {
+        put(&mut results.0, residuals, rows);
+        if !blocks.is_empty() {
             results.1.resize(blocks.len(), vec![]);
-            for ((to, from), n) in results.1.iter_mut().zip(&blocks).zip(&self.function.dimensions) {
+            for ((to, from), n) in results.1.iter_mut().zip(blocks).zip(&self.function.dimensions) {
                 put(to, from, rows * n);
             }
         }
+    }
+
+    /// Linearizes members of a smoother, and remembers the results. After an exception, members at a
+    /// remembered point have its results, so that a smoother can return to it. Returns the first member
+    /// without results.
+    fn compute_remembered(&mut self, indices: &[u32], columns: &Columns) -> Option<usize> {
+        let at = |i: &u32| self.members.get(*i as usize).map(|one| (one.number, self.point(one, columns)));
+        let (numbers, points): (Vec<usize>, Vec<Point>) = indices.iter().filter_map(at).unzip();
+        let mut done = self.function.linearized(&points);
+        let mut failed = None;
+        for (place, (i, point)) in indices.iter().zip(&points).enumerate() {
+            let Some(one) = self.members.get_mut(*i as usize) else { continue };
+            let at = self.function.numbers(point);
+            if !has_raised() {
+                one.memory.store(at, &self.function, place, &done);
+            } else if !one.memory.restore(&at, &self.function, place, &mut done) {
+                failed = failed.or(Some(one.entry));
+            }
+        }
+        self.publish(&numbers, &done);
+        failed
     }
 }
 
@@ -94,7 +125,9 @@ impl Batch for Whole {
         let Some(factor) = member.factor.downcast_ref::<Batched>() else { return };
         let number = self.numbers;
         self.numbers += 1;
-        self.members.push(One { number, constants: factor.constants.clone(), index: member.index.to_vec() });
+        let (constants, index) = (factor.constants.clone(), member.index.to_vec());
+        let memory = Memory::default();
+        self.members.push(One { number, constants, index, entry: member.entry, memory });
         let (function, results) = (self.function.clone(), self.results.clone());
         self.inner.push(&Member { factor: &Cached { function, number, results }, ..*member });
     }
@@ -143,8 +176,11 @@ impl Batch for Whole {
         columns: &Columns,
         to: &mut NormalEquations<'_>,
     ) -> Evaluation {
-        self.compute(Some(indices), columns, true);
-        self.inner.linearize_at(indices, columns, to)
+        let failed = self.compute_remembered(indices, columns);
+        let mut evaluation = self.inner.linearize_at(indices, columns, to);
+        // a smoother undoes its update if a new factor is not finite
+        evaluation.not_finite = evaluation.not_finite.or(failed);
+        evaluation
     }
     fn cost_at(&self, indices: &[u32], columns: &Columns) -> Evaluation {
         self.compute(Some(indices), columns, false);

@@ -1,5 +1,5 @@
 //! Graphs in files: documents and other formats.
-use super::{Graph, Values};
+use super::{Graph, Values, snapshot};
 use crate::errors;
 use crate::threads::detach;
 use manifactor::config::{Document, Format, read_graph, write_graph};
@@ -39,11 +39,12 @@ fn document_in(py: Python<'_>, graph: &InnerGraph, values: &InnerValues, format:
 #[pyfunction]
 fn formatted(
     py: Python<'_>,
-    graph: PyRef<'_, Graph>,
-    values: PyRef<'_, Values>,
+    graph: &Bound<'_, Graph>,
+    values: &Bound<'_, Values>,
     path: PathBuf,
 ) -> PyResult<(String, Vec<String>)> {
-    let (graph, values) = (&*graph.0, &*values.0);
+    let (graph, values) = (snapshot(graph)?, values.try_borrow()?.0.snapshot());
+    let (graph, values) = (&*graph, &*values);
     if let Some(format) = Format::of_path(&path) {
         return Ok((document_in(py, graph, values, format)?, vec![]));
     }
