@@ -1,4 +1,5 @@
 //! Registered types as Python objects: factors, losses, solvers, starts and values of variables.
+use crate::batch::function_address;
 use crate::errors::{self, Mistake};
 use crate::input::{
     Untagged, array, json_to_python, node, numbers, plain_node, to_array, to_python, unchangeable,
@@ -70,6 +71,25 @@ impl What {
         }
     }
 
+    fn json(&self) -> PyResult<Json> {
+        let json = match self {
+            Self::Factor(x) => serde_json::to_value(&**x),
+            Self::Loss(x) => serde_json::to_value(&**x),
+            Self::Solver(x) => serde_json::to_value(&**x),
+            Self::Start(x) => serde_json::to_value(&**x),
+            Self::Variable(x) => serde_json::to_value(&**x),
+        };
+        json.map_err(|error| errors::argument(self.names().1, "", error))
+    }
+
+    /// Returns whether both are equal; factors of Python functions are equal only to themselves.
+    fn equals(&self, other: &Self) -> PyResult<bool> {
+        match (self, other) {
+            (Self::Factor(x), Self::Factor(y)) => same_factor(&**x, &**y),
+            _ => Ok(self.names() == other.names() && self.json()? == other.json()?),
+        }
+    }
+
     /// Converts it to an object of its Python class.
     pub(crate) fn into_python(self, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
         let (kind, name) = self.names();
@@ -114,7 +134,11 @@ impl Chosen {
 
     /// A field, read-only: numbers as an array, nested fields as a mapping.
     fn __getattr__<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let (py, json) = (slf.py(), slf.get().json()?);
+        let py = slf.py();
+        let Ok(json) = slf.get().json() else {
+            let message = format!("a factor of a Python function has no field `{name}`");
+            return Err(PyAttributeError::new_err(message));
+        };
         match json.get(name) {
             Some(value) => unchangeable(py, value),
             None => {
@@ -127,6 +151,14 @@ impl Chosen {
                 )))
             }
         }
+    }
+
+    fn __setattr__(&self, name: &str, _value: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.unchanged(name)
+    }
+
+    fn __delattr__(&self, name: &str) -> PyResult<()> {
+        self.unchanged(name)
     }
 
     /// The constructor with its arguments, as Python reads them.
@@ -146,7 +178,7 @@ impl Chosen {
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> PyResult<bool> {
         match other.cast::<Self>() {
-            Ok(other) => Ok(self.0.names() == other.get().0.names() && self.json()? == other.get().json()?),
+            Ok(other) => self.0.equals(&other.get().0),
             Err(_) => Ok(false),
         }
     }
@@ -178,15 +210,27 @@ impl Chosen {
 
 impl Chosen {
     pub(crate) fn json(&self) -> PyResult<Json> {
-        let json = match &self.0 {
-            What::Factor(x) => serde_json::to_value(&**x),
-            What::Loss(x) => serde_json::to_value(&**x),
-            What::Solver(x) => serde_json::to_value(&**x),
-            What::Start(x) => serde_json::to_value(&**x),
-            What::Variable(x) => serde_json::to_value(&**x),
-        };
-        json.map_err(|error| errors::argument(self.0.names().1, "", error))
+        self.0.json()
     }
+
+    /// The error of a change, which would be lost.
+    fn unchanged(&self, name: &str) -> PyResult<()> {
+        let (_, of) = self.0.names();
+        Err(PyAttributeError::new_err(format!(
+            "`{of}` does not change: create a new one with another `{name}`"
+        )))
+    }
+}
+
+/// Returns whether factors are equal; factors of Python functions are equal only to themselves.
+pub(crate) fn same_factor(x: &dyn Factor, y: &dyn Factor) -> PyResult<bool> {
+    if function_address(x).is_some() || function_address(y).is_some() {
+        return Ok(std::ptr::addr_eq(x, y));
+    }
+    let json = |of: &dyn Factor| {
+        serde_json::to_value(of).map_err(|error| errors::argument(of.typetag_name(), "", error))
+    };
+    Ok(x.typetag_name() == y.typetag_name() && json(x)? == json(y)?)
 }
 
 /// Reads an object from its fields, as in a document.

@@ -1,6 +1,6 @@
 //! Factors with their keys, noise and loss, and functions for the most common ones.
 use super::{Noise, check, noise};
-use crate::chosen::{What, factor, factor_of_value, loss, variable};
+use crate::chosen::{What, factor, factor_of_value, loss, same_factor, variable};
 use crate::errors;
 use crate::input::{json_to_python, key_of, keys};
 use manifactor::geometry::{Between, Point2, Point3, Prior, Se2, Se3, Sim3, So2, So3};
@@ -100,7 +100,7 @@ impl FactorEntry {
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> PyResult<bool> {
         match other.cast::<Self>() {
-            Ok(other) => Ok(self.json()? == other.get().json()?),
+            Ok(other) => self.equals(other.get()),
             Err(_) => Ok(false),
         }
     }
@@ -145,6 +145,16 @@ impl FactorEntry {
 }
 
 impl FactorEntry {
+    fn equals(&self, other: &Self) -> PyResult<bool> {
+        let loss = |entry: &Self| entry.0.loss.as_ref().map(|loss| serde_json::to_value(&**loss)).transpose();
+        let (entry, other_entry) = (&self.0, &other.0);
+        Ok(entry.keys == other_entry.keys
+            && entry.name == other_entry.name
+            && entry.noise == other_entry.noise
+            && loss(self).map_err(errors::internal)? == loss(other).map_err(errors::internal)?
+            && same_factor(&*entry.factor, &*other_entry.factor)?)
+    }
+
     fn json(&self) -> PyResult<serde_json::Value> {
         serde_json::to_value(&self.0).map_err(|error| errors::argument("FactorEntry", "", error))
     }

@@ -179,3 +179,40 @@ def test_a_file_that_load_would_refuse_is_not_written(tmp_path: Path) -> None:
 def test_an_empty_key_is_refused(bad: Any) -> None:
     with pytest.raises(mf.ArgumentError, match="at least one character"):
         bad(mf.Graph(), mf.Values())
+
+
+@pytest.mark.parametrize(
+    "thing",
+    [
+        mf.huber(),
+        mf.levenberg_marquardt(),
+        mf.range_se2_point2(range=2.0),
+        mf.starts.given(),
+        mf.Point2(position=[0, 0]),
+        mf.ValueArray([mf.Point2(position=[0, 0])]),
+    ],
+)
+def test_an_attribute_of_an_object_does_not_change(thing: Any) -> None:
+    for name in ("scale", "position", "stop", "unknown"):
+        with pytest.raises(AttributeError, match=f"does not change: create a new one with another `{name}`"):
+            setattr(thing, name, 1.0)
+
+
+def test_a_graph_may_change_while_it_is_solved() -> None:
+    added: list[bool] = []
+
+    def observer(_: dict[str, Any]) -> None:
+        graph.add(mf.prior("a", ZERO))
+        values["c"] = ZERO
+        added.append(True)
+
+    @mf.batch(rows=1)
+    def bend(x: mf.Se2) -> Any:
+        graph.free("b")
+        return x.translation[:, 0] ** 3
+
+    graph, values = pair()
+    graph.add("a", bend())
+    solution = mf.solve(graph, values, observer=observer)
+    assert added and len(solution.graph) == 3 and len(graph) == 3 + len(added)
+    assert graph.cost(values) >= 0 and not graph.check(values)
