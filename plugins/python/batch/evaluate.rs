@@ -10,8 +10,11 @@ use std::any::TypeId;
 use std::fmt;
 use std::sync::Arc;
 
-/// Step of the central differences, about the cube root of the machine precision.
+/// Relative step of the central differences, about the cube root of the machine precision.
 const STEP: f64 = 6e-6;
+/// Smallest size of a coordinate for its step. A coordinate may be close to zero by chance, and with a smaller
+/// step, rounding would be more than 1e-6 of a residual of size 1.
+const SMALLEST: f64 = 1e-4;
 /// Largest number of points in one call. More points need more memory and are not faster.
 const MOST: usize = 1 << 15;
 
@@ -128,10 +131,8 @@ impl Function {
         let mut around = Inputs::new(self, points);
         for (v, n) in self.dimensions.iter().enumerate() {
             for direction in 0..*n {
-                for step in [STEP, -STEP] {
-                    let mut delta = vec![0.0; *n];
-                    delta.iter_mut().skip(direction).take(1).for_each(|x| *x = step);
-                    around.extend_moved(self, points, v, &delta);
+                for sign in [1.0, -1.0] {
+                    around.extend_moved(self, points, &Move { variable: v, direction, sign });
                 }
             }
         }
@@ -139,15 +140,20 @@ impl Function {
         let mut parts = all.chunks_exact((self.rows * points.len()).max(1));
         let residuals = parts.next().unwrap_or_default().to_vec();
         let mut blocks = vec![];
-        for n in &self.dimensions {
+        for (v, n) in self.dimensions.iter().enumerate() {
             let size = self.rows * n;
             let mut of_variable = vec![0.0; size * points.len()];
             for direction in 0..*n {
                 let (Some(ahead), Some(behind)) = (parts.next(), parts.next()) else { continue };
+                let width = |point: &Point| {
+                    point.variables.get(v).map_or(f64::NAN, |x| Step::of(&**x, direction).width())
+                };
+                let widths: Vec<f64> = points.iter().map(width).collect();
                 for (i, (a, b)) in ahead.iter().zip(behind).enumerate() {
                     let (point, row) = (i / self.rows, i % self.rows);
+                    let width = widths.get(point).copied().unwrap_or(f64::NAN);
                     if let Some(entry) = of_variable.get_mut(point * size + direction * self.rows + row) {
-                        *entry = (a - b) / (2.0 * STEP);
+                        *entry = (a - b) / width;
                     }
                 }
             }
@@ -199,6 +205,39 @@ fn unless_raised<T>(call: impl FnOnce() -> PyResult<T>) -> Option<T> {
     call().map_err(store_exception).ok()
 }
 
+/// A step of the central differences along a direction.
+struct Step {
+    coordinate: f64,
+    size: f64,
+}
+
+impl Step {
+    /// The step is relative to a coordinate below 1, which may have a small unit. Above 1 it grows with the
+    /// cube root, as rounding requires: a large coordinate, such as an easting, may have details of size 1.
+    fn of(x: &dyn Variable, direction: usize) -> Self {
+        let coordinate = x.erased().coordinate(direction).unwrap_or_default();
+        let scale = match coordinate.abs() {
+            // zero has no size
+            0.0 => 1.0,
+            large if large > 1.0 => large.cbrt(),
+            small => small.max(SMALLEST),
+        };
+        Self { coordinate, size: STEP * scale }
+    }
+
+    /// Distance of the two points, as rounded.
+    fn width(&self) -> f64 {
+        (self.coordinate + self.size) - (self.coordinate - self.size)
+    }
+}
+
+/// A move of one variable of each point, by a step of the central differences.
+struct Move {
+    variable: usize,
+    direction: usize,
+    sign: f64,
+}
+
 /// Reads numbers that a function has returned. Rows of NaN mean that the factor is undefined there.
 fn read(what: &str, name: &str, value: &Bound<'_, PyAny>, shape: &[usize]) -> PyResult<Vec<f64>> {
     let shape: Vec<_> = shape.iter().copied().map(Some).collect();
@@ -231,11 +270,11 @@ impl Inputs {
         inputs
     }
 
-    /// Appends a copy of the initial points in which one variable is moved by `delta`.
-    fn extend_moved(&mut self, function: &Function, points: &[Point], moved: usize, delta: &[f64]) {
+    /// Appends a copy of the initial points in which one variable is moved.
+    fn extend_moved(&mut self, function: &Function, points: &[Point], by: &Move) {
         for (v, to) in self.variables.iter_mut().enumerate() {
-            if v == moved {
-                extend(function, points, v, Some(delta), to);
+            if v == by.variable {
+                extend(function, points, v, Some(by), to);
             } else {
                 to.extend_from_within(..to.len() / self.count * points.len());
             }
@@ -247,14 +286,19 @@ impl Inputs {
     }
 }
 
-/// Appends the numbers of one variable of all points, moved by `delta` if it is given.
-fn extend(function: &Function, points: &[Point], v: usize, delta: Option<&[f64]>, to: &mut Vec<f64>) {
+/// Appends the numbers of one variable of all points, moved if `by` is given.
+fn extend(function: &Function, points: &[Point], v: usize, by: Option<&Move>, to: &mut Vec<f64>) {
     let Some(quantity) = function.quantities.get(v) else { return };
+    let mut delta = vec![0.0; quantity.dimension];
     for x in points.iter().filter_map(|point| point.variables.get(v)) {
         let at = to.len();
         to.resize(at + quantity.shape.size, 0.0);
         let to = to.get_mut(at..).unwrap_or_default();
-        match delta.and_then(|delta| x.erased().retract(delta)) {
+        let moved = by.and_then(|by| {
+            *delta.get_mut(by.direction)? = by.sign * Step::of(&**x, by.direction).size;
+            x.erased().retract(&delta)
+        });
+        match moved {
             Some(moved) => (quantity.values)(moved.erased().as_any(), to),
             None => (quantity.values)(x.erased().as_any(), to),
         }
