@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from inspect import Parameter
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from . import _native
 from .algebra import ValueArray
+from .captured import captured, used
 from .chosen import Factor, Variable
 from .errors import ArgumentError, Mistake
-from .traced import parameters
+from .traced import column, parameters
 
 Array = NDArray[np.float64]
 
@@ -57,6 +58,7 @@ class BatchFactor:
         factor."""
         arrays = []
         for name, value in self._given(dict(columns)).items():
+            value = column(value)
             array = as_array(value)
             if not isinstance(value, np.ndarray | ValueArray):
                 array = np.broadcast_to(array, (rows, *array.shape))
@@ -91,26 +93,41 @@ class BatchFactor:
 
     def _evaluate(self, shapes: tuple[tuple[int, ...], ...]) -> Callable[[list[Array], list[Array], bool], Any]:
         def evaluate(variables: list[Array], constants: list[Array], derivatives: bool) -> tuple[Any, Any]:
-            given = [c.reshape(len(c), *shape) for c, shape in zip(constants, shapes, strict=True)]
-            named = [FieldArray.of(array, of) for array, of in zip(variables, self.variables.values(), strict=True)]
-            residual = self._as_rows(self.function(*named, *given))
-            if not derivatives or self.jacobian is None:
+            needs_jacobian = derivatives and self.jacobian is not None
+            # the function may change its arrays in place, so the Jacobian gets others
+            others = ([x.copy() for x in variables], [c.copy() for c in constants]) if needs_jacobian else None
+            residual = self._as_rows(self.function(*self._arguments(variables, constants, shapes)))
+            if others is None or self.jacobian is None:
                 return residual, None
-            jacobians = self.jacobian(*named, *given)
+            jacobians = self.jacobian(*self._arguments(*others, shapes))
             if len(variables) == 1 and not isinstance(jacobians, list | tuple):
                 jacobians = [jacobians]
             return residual, [np.asarray(jacobian, dtype=float) for jacobian in jacobians]
 
         return evaluate
 
+    def _arguments(
+        self, variables: list[Array], constants: list[Array], shapes: tuple[tuple[int, ...], ...]
+    ) -> list[Array]:
+        named = [FieldArray.of(array, of) for array, of in zip(variables, self.variables.values(), strict=True)]
+        return [*named, *(c.reshape(len(c), *shape) for c, shape in zip(constants, shapes, strict=True))]
+
     def _as_rows(self, returned: Any) -> Array:
-        residual = np.asarray(returned, dtype=float)
+        numbers = np.asarray(returned)
+        if self.jacobian is None and numbers.dtype in (np.float16, np.float32):
+            message = f"expected float64, got {numbers.dtype}, whose finite differences are rounding errors"
+            help = 'compute in float64, or pass `jacobian`, a function or "jax"'
+            raise ArgumentError(self.__name__, [Mistake("the residual", message, help)])
+        residual = np.asarray(numbers, dtype=float)
         # a residual with one row may lack the second axis
         return residual[:, None] if residual.ndim == 1 and self.rows == 1 else residual
 
 
 def as_array(value: Any) -> Array:
     """Converts a constant to its numbers; the rows of an array of values are those of its numbers."""
+    if np.ma.is_masked(value):
+        message = "expected an array without masked entries"
+        raise ArgumentError("batch", [Mistake("constants", message, "`numpy.ma.filled` replaces them")])
     if isinstance(value, ValueArray):
         return value.numbers()
     if isinstance(value, Variable):
@@ -165,15 +182,14 @@ for _name in ("neg", "abs", "lt", "gt", "le", "ge", "getitem", "len", "iter"):
 
 def uses_jax(function: Callable[..., Any]) -> bool:
     """Returns True if a function refers to a JAX module."""
-    if "jax" not in sys.modules:
+    if "jax" not in sys.modules or not isinstance(function, FunctionType):
         return False
-    named = inspect.getclosurevars(function)
-    modules = [*named.globals.values(), *named.nonlocals.values()]
-    return any(getattr(module, "__name__", "").startswith("jax") for module in modules)
+    return any(getattr(module, "__name__", "").startswith("jax") for module in used(function).values())
 
 
 def by_jax(function: Callable[..., Any], variables: list[type[Variable]]) -> Callable[..., Any]:
-    """Jacobians from JAX: forward mode, point by point, compiled once for each shape."""
+    """Jacobians from JAX: forward mode, point by point, compiled once for each shape. They are compiled again
+    if the numbers have changed that the function uses besides its arguments, because compiled code keeps them."""
     import jax
     import jax.numpy as jnp
 
@@ -185,9 +201,24 @@ def by_jax(function: Callable[..., Any], variables: list[type[Variable]]) -> Cal
         returned = jnp.asarray(function(*named, *given[len(variables) :]))
         return jnp.atleast_1d(returned[0])
 
-    derivative = jax.vmap(jax.jacfwd(one, argnums=tuple(range(len(variables)))))
-    compiled: Callable[..., Any] = jax.jit(derivative)
-    return lambda *arguments: compiled(*(np.asarray(argument) for argument in arguments))
+    def compiled() -> Callable[..., Any]:
+        # JAX keeps compiled code for each function object
+        again = lambda *arguments: one(*arguments)
+        made: Callable[..., Any] = jax.jit(jax.vmap(jax.jacfwd(again, argnums=tuple(range(len(variables))))))
+        return made
+
+    state = (captured(function), compiled())
+
+    def jacobian(*arguments: Any) -> Any:
+        nonlocal state
+        known, current = state
+        now = captured(function)
+        if now != known:
+            current = compiled()
+            state = (now, current)
+        return current(*(np.asarray(argument) for argument in arguments))
+
+    return jacobian
 
 
 def batch(

@@ -10,6 +10,7 @@ import numpy as np
 
 from . import _native
 from .algebra import ValueArray, value_class
+from .captured import captured
 from .chosen import Factor, Variable
 from .errors import ManifactorError, Mistake, TraceError
 from .formula import VECTORS, Expr, Trace, Writer, wrong
@@ -66,8 +67,8 @@ class TracedFactor:
         self.__doc__ = function.__doc__
         self.__module__ = function.__module__
         self.__wrapped__ = function
-        #: Fields of the formula by the shapes of the constants.
-        self._traced: dict[tuple[str, ...], dict[str, Any]] = {}
+        #: By the shapes of the constants: the numbers that the function used, and the fields of the formula.
+        self._traced: dict[tuple[str, ...], tuple[tuple[Any, ...], dict[str, Any]]] = {}
 
     def __repr__(self) -> str:
         variables = [f"{name}: {of.__name__}" for name, of in self.variables.items()]
@@ -87,7 +88,7 @@ class TracedFactor:
 
     def __manifactor_fields__(self, columns: Mapping[str, Any]) -> dict[str, Any]:
         """Returns the fields of many factors: arrays among the constants have one row per factor."""
-        given = self._given(dict(columns))
+        given = {name: column(value) for name, value in self._given(dict(columns)).items()}
         shapes = {}
         for name, value in given.items():
             if isinstance(value, np.ndarray) and name != UP:
@@ -108,10 +109,11 @@ class TracedFactor:
         return {name: value for name, value in given.items() if value is not inspect.Parameter.empty}
 
     def _fields(self, given: dict[str, Any], shapes: dict[str, str]) -> dict[str, Any]:
-        key = tuple(shapes.values())
-        if key not in self._traced:
-            self._traced[key] = self._trace(shapes)
-        fields = dict(self._traced[key])
+        key, numbers = tuple(shapes.values()), captured(self.function)
+        traced = self._traced.get(key)
+        if traced is None or traced[0] != numbers:
+            traced = self._traced[key] = (numbers, self._trace(shapes))
+        fields = dict(traced[1])
         own = fields.pop("constants")
         constants = {name: value for name, value in given.items() if name != UP and name in fields["names"]}
         del fields["names"]
@@ -148,6 +150,14 @@ class TracedFactor:
         return fields
 
 
+def column(value: Any) -> Any:
+    """Converts an object with axes that NumPy converts to an array, such as a `pandas.Series`, to this array."""
+    if isinstance(value, np.ndarray | np.generic | Variable | ValueArray) or not hasattr(value, "__array__"):
+        return value
+    array = np.asarray(value)
+    return array if array.ndim else value
+
+
 def plain(value: Any) -> Any:
     """Converts a constant as for a document; an array with one row per factor stays an array."""
     if isinstance(value, ValueArray):
@@ -179,7 +189,8 @@ def factor(function: Callable[..., Any]) -> TracedFactor:
 
     Arguments that are annotated with a type of variables are the factor's variables, in the order of its
     keys. All remaining arguments are constants, given when the factor is made. The default of `up` is the
-    world's up. The function is called once, with symbols of a formula as arguments. The factor therefore
+    world's up. The function is called with symbols of a formula as arguments: once, and again after a global
+    or an outer variable with a number has changed. The factor therefore
     runs at the speed of Rust, has exact derivatives, and is saved as its formula::
 
         @mf.factor

@@ -178,3 +178,126 @@ def test_mistakes_in_a_declaration() -> None:
         ranges()
     with pytest.raises(mf.ArgumentError, match="measured: expected an array of 2 rows, one for each, got shape"):
         mf.Graph().add_many(ranges, [("a", "b"), ("c", "d")], {"measured": np.ones(3)})
+
+
+def test_a_function_may_change_its_arrays() -> None:
+    def distance(x: Any, p: Any) -> Any:
+        away = x.translation
+        away -= p
+        return np.linalg.norm(away, axis=1)
+
+    def by_hand(x: Any, p: Any) -> Any:
+        away = x.translation - p
+        unit = (away / np.linalg.norm(away, axis=1, keepdims=True))[:, None, :]
+        return np.concatenate([np.zeros((len(x), 1, 4)), unit], axis=2), -unit
+
+    @mf.batch(rows=1, jacobian=by_hand)
+    def hand(x: mf.Se3, p: mf.Point3) -> Any:
+        return distance(x, p)
+
+    @mf.batch(rows=1)
+    def differences(x: mf.Se3, p: mf.Point3) -> Any:
+        return distance(x, p)
+
+    at = mf.Se3(translation=[1, 2, 3], rotation=[0, 0, 0, 1]), mf.Point3(position=[4, 6, 3])
+    for factor in (hand(), differences()):
+        residual, jacobians = factor.linearize(*at)
+        assert residual == pytest.approx([5.0])
+        np.testing.assert_allclose(jacobians[1], [[0.6, 0.8, 0]], atol=1e-9)
+
+
+@pytest.mark.parametrize("size", [1.2e-5, 1.0, 1e4, 1e8])
+def test_differences_fit_the_size_of_a_variable(size: float) -> None:
+    @mf.batch(rows=1)
+    def decay(k: mf.Point1) -> Any:
+        return np.exp(-np.asarray(k) / size)
+
+    _, [jacobian] = decay().linearize(mf.Point1(position=[size]))
+    np.testing.assert_allclose(jacobian * size, [[-np.exp(-1)]], rtol=1e-5)
+
+
+def test_differences_see_details_far_from_the_origin() -> None:
+    @mf.batch(rows=1)
+    def local(k: mf.Point1) -> Any:
+        return np.sin(np.asarray(k) - 5e6)
+
+    _, [jacobian] = local().linearize(mf.Point1(position=[5e6 + 0.5]))
+    np.testing.assert_allclose(jacobian, [[np.cos(0.5)]], rtol=1e-5)
+
+
+def test_single_precision_needs_a_jacobian() -> None:
+    def pixel(x: mf.Point1) -> Any:
+        return np.float32(600) + np.float32(3) * np.asarray(x, dtype=np.float32)
+
+    at = mf.Point1(position=[0.1])
+    with pytest.raises(mf.ArgumentError, match="the residual: expected float64, got float32.*pass `jacobian`"):
+        mf.batch(rows=1)(pixel)().linearize(at)
+    _, [jacobian] = mf.batch(rows=1, jacobian=lambda x: np.full((1, 1, 1), 3))(pixel)().linearize(at)
+    assert jacobian == pytest.approx(3)
+
+
+def test_a_factor_of_a_function_is_equal_to_itself_only() -> None:
+    ranges, _ = numbers("by hand")
+    factor, other = ranges(measured=1.0), ranges(measured=1.0)
+    assert factor == factor and factor != other and hash(factor) == hash(factor)
+    assert not hasattr(factor, "anything") and factor != mf.range_se3_point3(range=1.0)
+    graph = mf.Graph()
+    for of in (factor, other):
+        graph.add(["x", "p"], of)
+    assert graph[0] == graph[0] and graph[0] != graph[1] and list(graph).index(graph[1]) == 1
+
+
+def test_series_and_masked_arrays_are_constants() -> None:
+    pandas = pytest.importorskip("pandas")
+
+    @mf.batch(rows=1)
+    def offset(p: mf.Point1, z: Any) -> Any:
+        return np.asarray(p) - z[:, None]
+
+    @mf.factor
+    def traced(a: mf.Point1, z: Any) -> Any:
+        return a - z
+
+    at = mf.Point1(position=[0])
+    for factor in (offset, traced):
+        graph = mf.Graph()
+        graph.add_many(factor, ["a", "b"], {"z": pandas.Series([1.0, 2.0])})
+        assert [graph[i].factor.residual(at)[0] for i in range(2)] == [-1, -2]
+        with pytest.raises(mf.ArgumentError, match="without masked entries"):
+            graph.add_many(factor, ["a", "b"], {"z": np.ma.masked_equal([1.0, 2.0], 2.0)})
+
+
+def test_jax_uses_the_present_numbers_of_a_function() -> None:
+    pytest.importorskip("jax")
+    import jax.numpy as jnp
+
+    weights, gain = np.array([1.0]), 1.0
+
+    @mf.batch(rows=1)
+    def model(x: mf.Point1) -> Any:
+        return jnp.asarray(x) * weights[0] * gain - 6.0
+
+    factor, at = model(), mf.Point1(position=[2.5])
+    assert factor.linearize(at)[1][0] == pytest.approx(1)
+    weights[0] = 3.0
+    residual, [jacobian] = factor.linearize(at)
+    assert residual == pytest.approx(1.5) and jacobian == pytest.approx(3)
+    gain = 2.0
+    assert factor.linearize(at)[1][0] == pytest.approx(6)
+
+
+def test_a_formula_uses_the_present_numbers_of_its_function() -> None:
+    gain = 1.0
+
+    def scale(a: Any) -> Any:
+        return a * gain
+
+    @mf.factor
+    def scaled(a: mf.Point1, m: Any) -> Any:
+        return scale(a) - m
+
+    graph = mf.Graph()
+    for gain, m in ((1.0, 1.0), (2.0, 4.0), (3.0, 9.0)):
+        graph.add("a", scaled(m=m))
+    at = mf.Point1(position=[1.0])
+    assert [graph[i].factor.residual(at)[0] for i in range(3)] == [0, -2, -6]
