@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Self, SupportsIndex, final
+from typing import Any, NoReturn, Self, SupportsIndex, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,6 +32,8 @@ class Chosen:
         """Returns the fields and the `type`, as in a document."""
     def __getattr__(self, name: str) -> Any:
         """A field, read-only: numbers as an array, nested fields as a mapping."""
+    def __setattr__(self, name: str, value: Any, /) -> NoReturn:
+        """Raises an `AttributeError`, because an object does not change."""
     def __copy__(self) -> Self: ...
     def __deepcopy__(self, memo: Any) -> Self: ...
 
@@ -167,8 +169,8 @@ class Graph:
     ) -> tuple[int, int]:
         """Adds many factors of one type, and returns the range of their indices.
 
-        `factor` is a type, such as `mf.between_se3` or its name, with its `fields`: an array has one row
-        per factor, everything else is shared by all, and nested fields are dicts or `ValueArray`s. A `Factor`
+        `factor` is a type, such as `mf.between_se3` or its name, with its `fields`: an array, a `pandas.Series`
+        or a `ValueArray` has one row per factor, everything else is shared by all, and nested fields are dicts. A `Factor`
         object is used for all rows. `keys` has one row per factor: texts, or an integer array, shape (n, k), whose keys
         are `prefix` plus the number; there may be one prefix per column. `noise` is shared by all, or a
         dict of one of its forms with an array: `{"sigmas": array}`, shape (n, m). After an error, nothing
@@ -295,8 +297,8 @@ class Solution:
     def residual(self, factor: int) -> _Array:
         """Returns the residual of a factor at the estimate, not whitened, shape (rows,)."""
     def covariances(self, keys: _Keys | None = None) -> dict[str, _Array]:
-        """Returns marginal covariances at the estimate by key, of the given variables or of all. Rows and
-        columns are the tangent directions of the variable, in their order and units."""
+        """Returns marginal covariances at the estimate by key, of the given variables, or of all for `None`.
+        Rows and columns are the tangent directions of the variable, in their order and units."""
     def joint_covariance(self, keys: _Keys) -> _Array:
         """Returns the joint covariance of a few variables at the estimate, in the order of `keys` and of
         their tangent directions."""
@@ -307,7 +309,7 @@ class Solution:
 
 @final
 class FactorId:
-    """The id of a factor in a smoother."""
+    """The id of a factor in a smoother. It can be pickled with its smoother."""
 
 @final
 class Smoother:
@@ -329,7 +331,9 @@ class Smoother:
         """Sets the time of the next factors and variables, for a window by time. Unit: seconds."""
     def update(self) -> dict[str, Any]:
         """Applies the changes, and updates the estimate. Returns a report: `redone`, `relinearized`,
-        `parked`, `undetermined` and so on. After an error, the smoother is unchanged."""
+        `parked`, `undetermined` and so on. After an error, the smoother is unchanged. If a function of
+        `@mf.batch` raises an exception only at a new point of an old factor, the factor keeps its last
+        linearization, and the changes are applied."""
     def __getitem__(self, key: _Key) -> Variable:
         """The estimate of a variable after the last update."""
     def __contains__(self, key: object) -> bool: ...
@@ -427,7 +431,7 @@ def online(
     data: str | None,
     lines: Iterator[str] | None = None,
     on_frame: Callable[[dict[str, Any]], bool | None] | None = None,
-) -> tuple[str, str, str, str]: ...
+) -> tuple[tuple[str, str, str, str], int, str | None]: ...
 def experiment(
     config: str,
     json: str | None,

@@ -302,7 +302,15 @@ def where(condition: Any, a: Any, b: Any) -> Any:
     branch."""
     if isinstance(condition, Condition):
         return condition.select(a, b)
-    return a if condition else b
+    return a if is_true(condition) else b
+
+
+def is_true(condition: Any) -> bool:
+    """Returns a plain truth value. `~True` is the number -2, which would count as true."""
+    if not isinstance(condition, bool | np.bool_):
+        found = type(condition).__name__
+        wrong(f"expected a condition such as x < 1, got {found}", "write `not` for ~ of a plain truth value")
+    return bool(condition)
 
 
 def require(condition: Any) -> None:
@@ -310,7 +318,7 @@ def require(condition: Any) -> None:
     if isinstance(condition, Condition):
         inside = condition.select(1.0, -1.0)
         inside.trace.domain.append(inside)
-    elif not condition:
+    elif not is_true(condition):
         wrong("this requirement never holds")
 
 
