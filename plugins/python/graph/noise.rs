@@ -168,6 +168,10 @@ pub(super) fn one(what: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Inne
     if value.is_instance_of::<PyFloat>() || value.is_instance_of::<PyInt>() {
         return made(what, "noise", "sigma", &[value.extract()?]);
     }
+    // a number of NumPy; only float64 is a float
+    if value.hasattr("dtype")? && array(what, "noise", value)?.shape().is_empty() {
+        return made(what, "noise", "sigma", &read(what, "noise", "sigma", value, None)?.values);
+    }
     let found = value.get_type().name()?;
     Err(PyTypeError::new_err(format!("noise: expected a Noise or a standard deviation, got {found}")))
 }

@@ -221,6 +221,10 @@ def test_columns_of_pandas_and_values_that_all_factors_share() -> None:
     # a number of NumPy is shared by all
     graph.add_many(mf.range_se2_point2, [["a", "b"]] * 2, {"range": np.float32(2)})
     assert graph[7].factor.range == 2
+    sigmas: list[Any] = [np.float32(0.5), np.int64(2)]
+    for sigma in sigmas:
+        graph.add("x0", mf.prior_se3(value=step), noise=sigma)
+    assert graph[8].noise == mf.Noise(0.5) and graph[9].noise == mf.Noise(2.0)
 
 
 def test_masked_entries_are_refused() -> None:
