@@ -46,7 +46,7 @@ impl Graph {
     #[pyo3(signature = (keys, factor = None, *, noise = None, sigma = None, sigmas = None, loss = None, name = None))]
     #[expect(clippy::too_many_arguments, reason = "the keyword arguments of Python")]
     fn add(
-        &mut self,
+        slf: &Bound<'_, Self>,
         keys: &Bound<'_, PyAny>,
         factor: Option<&Bound<'_, PyAny>>,
         noise: Option<&Bound<'_, PyAny>>,
@@ -56,7 +56,7 @@ impl Graph {
         name: Option<&str>,
     ) -> PyResult<usize> {
         let options = Options { noise, sigma, sigmas, loss, name };
-        let at = self.0.factors().len();
+        let at = snapshot(slf)?.factors().len();
         let entry = match (keys.cast::<FactorEntry>(), factor) {
             (Ok(entry), None) if options.is_empty() => entry.get().0.clone(),
             (Ok(_), _) => {
@@ -76,14 +76,17 @@ impl Graph {
                 options.entry("add", at, keys, factor)?
             }
         };
-        self.0.change("graph")?.push(entry);
+        // reading the arguments may run Python, and so other threads, which add factors too
+        let mut this = slf.try_borrow_mut()?;
+        let at = this.0.factors().len();
+        this.0.change("graph")?.push(entry);
         Ok(at)
     }
 
     /// Adds many factors of one type, and returns the range of their indices.
     #[pyo3(signature = (factor, keys, fields = None, *, prefix = None, noise = None, loss = None))]
     fn add_many(
-        &mut self,
+        slf: &Bound<'_, Self>,
         factor: &Bound<'_, PyAny>,
         keys: &Bound<'_, PyAny>,
         fields: Option<&Bound<'_, PyAny>>,
@@ -97,7 +100,7 @@ impl Graph {
         let mut noises = noise::Rows::new("add_many", rows, noise)?;
         let fields = fields.map(dict_of).transpose()?;
         let mut factors = Factors::new(factor, rows, fields.as_ref())?;
-        let (first, graph) = (self.0.factors().len(), self.0.change("graph")?);
+        let first = snapshot(slf)?.factors().len();
         // all factors are added or none
         let mut entries = Vec::with_capacity(rows);
         for (row, keys) in keys.chunks_exact(width.max(1)).enumerate() {
@@ -111,7 +114,9 @@ impl Graph {
             }
             entries.push(entry);
         }
-        graph.factors_mut().append(&mut entries);
+        let mut this = slf.try_borrow_mut()?;
+        let first = this.0.factors().len();
+        this.0.change("graph")?.factors_mut().append(&mut entries);
         Ok((first, first + rows))
     }
 

@@ -118,7 +118,7 @@ impl Values {
     /// Inserts many values of one type, from an array of values or from a type and its fields.
     #[pyo3(signature = (keys, r#type, fields = None, *, prefix = None))]
     fn insert_many(
-        &mut self,
+        slf: &Bound<'_, Self>,
         keys: &Bound<'_, PyAny>,
         r#type: &Bound<'_, PyAny>,
         fields: Option<&Bound<'_, PyAny>>,
@@ -142,7 +142,9 @@ impl Values {
             }
             made.insert(key, rows.row(row)?);
         }
-        let values = self.0.change("values")?;
+        // reading the arguments may run Python, and so other threads
+        let mut this = slf.try_borrow_mut()?;
+        let values = this.0.change("values")?;
         made.into_iter().for_each(|(key, value)| drop(values.insert_boxed(key, value)));
         Ok(())
     }

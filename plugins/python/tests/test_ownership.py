@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -216,3 +217,18 @@ def test_a_graph_may_change_while_it_is_solved() -> None:
     solution = mf.solve(graph, values, observer=observer)
     assert added and len(solution.graph) == 3 and len(graph) == 3 + len(added)
     assert graph.cost(values) >= 0 and not graph.check(values)
+
+
+def test_a_graph_may_change_while_its_arguments_are_read() -> None:
+    class Keys:
+        def __iter__(self) -> Iterator[str]:
+            graph.add(mf.prior("b", ZERO))
+            values["b"] = ZERO
+            yield "a"
+
+    graph, values = mf.Graph(), mf.Values()
+    keys: Any = Keys()
+    assert graph.add(keys, mf.prior_se2(value=ZERO)) == 1
+    assert graph.add_many(mf.prior_se2, keys, {"value": ZERO}) == (3, 4)
+    values.insert_many(keys, mf.Se2, {"translation": [0, 0], "angle": 0})
+    assert [graph[i].keys for i in range(4)] == [["b"], ["a"], ["b"], ["a"]] and set(values) == {"a", "b"}
