@@ -121,12 +121,17 @@ impl Graph {
     }
 
     /// Fixes a variable at its initial value, either entirely or only in the given directions of its
-    /// tangent space.
+    /// tangent space, in addition to those that are fixed.
     #[pyo3(signature = (key, directions = None))]
     fn fix(&mut self, key: &Bound<'_, PyAny>, directions: Option<Vec<String>>) -> PyResult<()> {
         let key = key_of("fix", key)?;
-        let fixed = directions.map_or(Fixed::Whole(true), Fixed::Directions);
-        self.0.change("graph")?.set_fixed(key, fixed);
+        let graph = self.0.change("graph")?;
+        match directions {
+            Some(names) => {
+                graph.fix_directions(key, &names.iter().map(String::as_str).collect::<Vec<_>>());
+            }
+            None => graph.fix(key),
+        }
         Ok(())
     }
 
@@ -152,7 +157,8 @@ impl Graph {
     }
 
     /// Bounds a coordinate of a variable, which steps do not cross: `graph.bound("scale", "x", min=0.5)`.
-    /// Coordinates are those to which steps add, such as those of a point or the focal length of a camera.
+    /// Coordinates are those to which steps add, such as those of a point or the focal length of a camera. A limit that
+    /// is not given stays as it is.
     #[pyo3(signature = (key, direction, *, min = None, max = None))]
     fn bound(
         &mut self,

@@ -52,7 +52,7 @@ pub struct Stopping {
     /// unknowns, steps continue to 1e-15, which is rounding error, as long as there are iterations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relative_cost: Option<NotNegative>,
-    /// Stop once the cost is below this.
+    /// Stop once the cost is below this. For coordinates below one it shrinks with their square.
     pub absolute_cost: NotNegative,
     /// Stop once no entry of the gradient is larger than this.
     pub gradient: NotNegative,

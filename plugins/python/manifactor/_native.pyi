@@ -177,7 +177,7 @@ class Graph:
         is added."""
     def fix(self, key: _Key, directions: Sequence[str] | None = None) -> None:
         """Fixes a variable at its initial value, either entirely or only in the given directions of its
-        tangent space."""
+        tangent space, in addition to those that are fixed."""
     def free(self, key: _Key) -> None:
         """Removes the constraint of `fix` from a variable."""
     @property
@@ -188,7 +188,8 @@ class Graph:
         self, key: _Key, direction: str, *, min: float | None = None, max: float | None = None
     ) -> None:
         """Bounds a coordinate of a variable, which steps do not cross: `graph.bound("scale", "x", min=0.5)`.
-        Coordinates are those to which steps add, such as those of a point or the focal length of a camera."""
+        Coordinates are those to which steps add, such as those of a point or the focal length of a camera. A
+        limit that is not given stays as it is."""
     def unbound(self, key: _Key) -> None:
         """Removes the bounds of a variable."""
     @property

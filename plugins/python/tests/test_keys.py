@@ -150,3 +150,17 @@ def test_an_id_of_a_factor_is_pickled_with_its_smoother() -> None:
     assert len(smoother.graph()) == 2
     with pytest.raises(mf.GraphError, match="there is no factor 2"):
         smoother.remove(again[2:])
+
+
+def test_what_is_fixed_and_bounded_adds_up() -> None:
+    graph = mf.Graph()
+    graph.fix("a", ["x"])
+    graph.fix("a", ["y"])
+    graph.bound("b", "x", min=0.0)
+    graph.bound("b", "x", max=9.0)
+    other = mf.Graph()
+    other.fix("a", ["z"])
+    other.bound("b", "x", max=5.0)
+    both = graph + other
+    assert graph.fixed["a"] == ["x", "y"] and graph.bounds["b"]["x"] == (0.0, 9.0)
+    assert both.fixed["a"] == ["x", "y", "z"] and both.bounds["b"]["x"] == (0.0, 5.0)
