@@ -34,6 +34,7 @@ __all__ = [
     "conic_distance",
     "constant_velocity",
     "expression",
+    "external_position_se3",
     "heading_se3",
     "horizontal_orientation",
     "horizontal_orientation_smooth",
@@ -687,6 +688,29 @@ def expression(
         domain: Formulas that must be positive for the factor to be defined.
     """
     return Factor("expression", {"variables": variables, "residual": residual, "define": define, "constants": constants, "up": up, "domain": domain})
+
+
+def external_position_se3(*, position: Numbers, lever_arm: Numbers | None = None) -> Factor:
+    """An antenna on the pose is at `position` in an external frame: r = E (R l + t) - z.
+
+    E is the first variable, the pose of the map in the external frame, such as east, north and up of a satellite
+    receiver, or the frame of a total station. The second variable is the pose, in the map. Three rows in metres, along the axes of
+    the external frame. Three positions that are not on a line determine E; otherwise it needs a prior. Invariant to a new
+    frame of the map. Source: as the GPS factors of GTSAM, with the frame as a variable.
+
+    ```toml
+    [[factors]]
+    keys = ["enu_from_map", "x0"]
+    factor = { type = "external_position_se3", position = [1.0, 0.5, 0.0], lever_arm = [0.0, 0.0, 1.2] }
+    noise = { sigma = 2.0 }
+    ```
+
+    Args:
+        position: Measured position of the antenna in the external frame, in metres.
+        lever_arm: Position of the antenna in the frame of the pose, in metres. Default: the origin of
+            that frame.
+    """
+    return Factor("external_position_se3", {"position": position, "lever_arm": lever_arm})
 
 
 def heading_se3(

@@ -164,7 +164,7 @@ class Stopping(TypedDict, total=False):
     #: Stop once a step changes the cost by less than this share of it. Default: 1e-8. With at most 32
     #: unknowns, steps continue to 1e-15, which is rounding error, as long as there are iterations.
     relative_cost: Number
-    #: Stop once the cost is below this.
+    #: Stop once the cost is below this. For coordinates below one it shrinks with their square.
     absolute_cost: Number
     #: Stop once no entry of the gradient is larger than this.
     gradient: Number
