@@ -238,7 +238,7 @@ impl Graph {
     }
     /// Bounds a coordinate of a variable, by the name of its direction:
     /// `graph.bound("camera", "f", Interval::new(400.0..=600.0)?)`. Steps stop at the bounds. A limit that the interval
-    /// does not have stays as it is.
+    /// does not have stays as it is, unless it contradicts the new one.
     pub fn bound(&mut self, key: impl Into<Key>, direction: impl Into<String>, interval: Interval) {
         self.version = Version::default();
         self.bounds.entry(key.into()).or_default().insert(direction, interval);

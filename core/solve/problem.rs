@@ -94,7 +94,9 @@ impl Problem {
         }
         let mut costs = vec![];
         self.model.factor_costs(&mut costs);
-        costs.iter().zip(is_constant).filter(|(_, is_constant)| *is_constant).map(|(cost, _)| cost).sum()
+        let weights = self.model.weights();
+        let weighted = costs.iter().enumerate().map(|(i, cost)| weights.get(i).unwrap_or(&1.0) * cost);
+        weighted.zip(is_constant).filter(|(_, is_constant)| *is_constant).map(|(cost, _)| cost).sum()
     }
 
     /// Returns the coordinate to which each scalar unknown adds; `None` for unknowns without one, such as rotations.

@@ -14,13 +14,10 @@ const REST_SHARE: f64 = 0.02;
 const MIN_AT_LIMIT: usize = 5;
 /// A limit is at least this many steps of the sensor's resolution from zero. A sensor at rest has few different values.
 const MIN_STEPS: f64 = 50.0;
-/// Length of gravity, in m/s².
-const GRAVITY: f64 = 9.81;
-
 /// Damaged readings of one kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Damage {
-    /// What is wrong with them.
+    /// Kind of damage.
     #[serde(flatten)]
     pub kind: DamageKind,
     /// Their number.
@@ -29,11 +26,11 @@ pub struct Damage {
     pub from: f64,
 }
 
-/// What is wrong with readings.
+/// Kind of damage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "damage", rename_all = "snake_case")]
 pub enum DamageKind {
-    /// All six numbers are equal to those of the reading before, not at rest.
+    /// All six numbers are equal to those of the reading before, in motion.
     Repeated,
     /// An axis stays at its largest or smallest value while the other axes vary.
     Saturated {
@@ -61,13 +58,13 @@ impl fmt::Display for Damage {
     }
 }
 
-/// Returns the damage of a sensor's readings, in the order of their times.
-pub fn damage(readings: &[ImuReading]) -> Vec<Damage> {
+/// Finds damaged readings. `gravity` is its length, in m/s².
+pub fn find_damage(readings: &[ImuReading], gravity: f64) -> Vec<Damage> {
     const AXES: [[&str; 3]; 2] = [
         ["gyroscope x", "gyroscope y", "gyroscope z"],
         ["accelerometer x", "accelerometer y", "accelerometer z"],
     ];
-    let mut found: Vec<Damage> = repeated(readings).into_iter().collect();
+    let mut found: Vec<Damage> = repeated(readings, gravity).into_iter().collect();
     let sensors: [fn(&ImuReading) -> Vector3<f64>; 2] = [|r| r.gyroscope, |r| r.accelerometer];
     for (sensor, names) in sensors.into_iter().zip(AXES) {
         for (axis, name) in names.into_iter().enumerate() {
@@ -90,9 +87,9 @@ fn runs(count: usize, continues: impl Fn(usize, usize) -> bool) -> Vec<(usize, u
     runs
 }
 
-fn repeated(readings: &[ImuReading]) -> Option<Damage> {
+fn repeated(readings: &[ImuReading], gravity: f64) -> Option<Damage> {
     let moves = |reading: &ImuReading| {
-        let force = reading.accelerometer.norm() / GRAVITY;
+        let force = reading.accelerometer.norm() / gravity;
         reading.gyroscope.norm() > REST_RATE || (force - 1.0).abs() > REST_SHARE
     };
     let is_equal = |i: usize, j: usize| {
@@ -103,7 +100,11 @@ fn repeated(readings: &[ImuReading]) -> Option<Damage> {
     let long: Vec<_> = runs.into_iter().filter(|(_, length)| *length >= MIN_EQUAL).collect();
     let (first, _) = long.first()?;
     let readings_of_all = long.iter().map(|(_, length)| length - 1).sum();
-    Some(Damage { kind: DamageKind::Repeated, readings: readings_of_all, from: readings[*first].timestamp })
+    Some(Damage {
+        kind: DamageKind::Repeated,
+        readings: readings_of_all,
+        from: readings[first + 1].timestamp,
+    })
 }
 
 fn saturated(
@@ -111,7 +112,7 @@ fn saturated(
     sensor: &impl Fn(&ImuReading) -> Vector3<f64>,
     axis: usize,
     name: &'static str,
-) -> Option<Damage> {
+) -> Vec<Damage> {
     let values: Vec<Vector3<f64>> = readings.iter().map(sensor).collect();
     let own = || values.iter().map(|value| value[axis]);
     let steps = values.windows(2).map(|two| (two[1][axis] - two[0][axis]).abs()).filter(|step| *step > 0.0);
@@ -130,7 +131,7 @@ fn saturated(
         Some(Damage { kind, readings: count, from: readings[*first].timestamp })
     };
     let is_far = |limit: &f64| limit.is_finite() && limit.abs() >= MIN_STEPS * resolution;
-    extremes.into_iter().filter(is_far).find_map(stays)
+    extremes.into_iter().filter(is_far).filter_map(stays).collect()
 }
 
 #[cfg(test)]
@@ -141,7 +142,7 @@ mod tests {
     fn said(change: impl FnOnce(&mut [ImuReading])) -> Vec<String> {
         let mut readings = SimulatedFlight::new(8.0, 2).readings;
         change(&mut readings);
-        damage(&readings).iter().map(Damage::to_string).collect()
+        find_damage(&readings, 9.81).iter().map(Damage::to_string).collect()
     }
 
     #[test]
@@ -165,7 +166,9 @@ mod tests {
             gyroscope: Vector3::zeros(),
             accelerometer: Vector3::new(0.0, 0.0, 9.81),
         };
-        assert_eq!(damage(&[rest; 100]), []);
+        assert_eq!(find_damage(&[rest; 100], 9.81), []);
+        let moon = ImuReading { accelerometer: Vector3::new(0.0, 0.0, 1.62), ..rest };
+        assert_eq!(find_damage(&[moon; 100], 1.62), []);
     }
 
     #[test]

@@ -13,7 +13,7 @@ mod tests;
 
 pub use faults::{Axes, Fault, Sensor};
 
-use crate::damage::{Damage, damage};
+use crate::damage::{Damage, find_damage};
 use crate::samples::ImuReading;
 use crate::visual::TrackedPoint;
 use gravity::GravityFit;
@@ -261,7 +261,7 @@ impl Recording {
         fit.check()?;
         let Fit { rotation: RotationFit { median: residual, points, .. }, gravity } = fit;
         let is_explained = pairs >= MIN_PAIRS && residual <= MAX_RESIDUAL;
-        let damage = damage(&self.readings);
+        let damage = find_damage(&self.readings, self.gravity);
         Ok(Diagnosis {
             findings,
             damage,

@@ -13,7 +13,7 @@ mod samples;
 pub mod testing;
 pub mod visual;
 
-pub use damage::{Damage, DamageKind, damage};
+pub use damage::{Damage, DamageKind, find_damage};
 pub use imu::Imu;
 pub use preintegration::{Preintegration, RelativeMotion};
 pub use samples::{CoverageError, ImuDensities, ImuReading, ImuSample, MAX_RATE, SampleError};

@@ -15,7 +15,7 @@ pub enum Fixed {
 }
 
 impl Fixed {
-    /// Returns what is fixed if both are.
+    /// Returns the union of both.
     pub(super) fn with(self, other: Self) -> Self {
         match (self, other) {
             (Self::Directions(mut names), Self::Directions(more)) => {

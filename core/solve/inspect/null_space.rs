@@ -47,8 +47,10 @@ pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) ->
 fn references(problem: &Problem) -> Vec<f64> {
     let coordinates = problem.coordinates();
     let size = |x: &Option<f64>| x.filter(|x| *x != 0.0).map_or(1.0, |x| x.abs().min(1.0));
-    let entries: Vec<f64> =
+    let mut entries: Vec<f64> =
         problem.system.diagonal().zip(&coordinates).map(|(d, x)| d * size(x) * size(x)).collect();
+    // the diagonal of unknowns that are held at a bound is set to one
+    problem.system.held_at_bound().iter().for_each(|i| entries[*i] = 0.0);
     let (starts, rows, ..) = problem.normal_equations();
     let mut largest = entries.clone();
     for (column, range) in starts.windows(2).enumerate() {

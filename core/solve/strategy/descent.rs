@@ -185,8 +185,9 @@ impl<'a> Descent<'a> {
     }
 
     /// Returns the cost at the estimate that steps can change. Relative changes are shares of it.
-    fn changing_cost(&self) -> f64 {
-        (self.at.cost - self.constant_cost).abs()
+    pub(crate) fn changing_cost(&self) -> f64 {
+        // no less than the rounding of the sum
+        (self.at.cost - self.constant_cost).max(f64::EPSILON * self.at.cost.abs())
     }
 
     /// Returns the gradient g = Jᵀr at the estimate.
@@ -315,8 +316,11 @@ impl<'a> Descent<'a> {
         }
         let coordinates = self.problem.coordinates();
         let sizes = coordinates.iter().map(|x| x.map_or(1.0, |x| x.abs().min(1.0)));
-        let information = self.problem.system.diagonal().zip(sizes).map(|(d, size)| d * size * size);
-        cost <= limit * information.fold(0.0, f64::max).min(1.0)
+        let mut information: Vec<f64> =
+            self.problem.system.diagonal().zip(sizes).map(|(d, size)| d * size * size).collect();
+        // the diagonal of held unknowns is set to one
+        self.problem.system.held.iter().for_each(|i| information[*i] = 0.0);
+        cost <= limit * information.into_iter().fold(0.0, f64::max).min(1.0)
     }
 
     /// Returns whether a step is within the tolerance, and changes no coordinate by more than a millionth of its value.

@@ -54,9 +54,10 @@ pub struct Stopping {
     pub relative_cost: Option<NotNegative>,
     /// Stop once the cost is below this. For coordinates below one it shrinks with their square.
     pub absolute_cost: NotNegative,
-    /// Stop once no entry of the gradient is larger than this.
+    /// Stop once no entry of the gradient is larger than this, and no single unknown could lower the cost by a
+    /// thousandth.
     pub gradient: NotNegative,
-    /// Stop once the Euclidean norm of a step is below this.
+    /// Stop once the Euclidean norm of a step is below this, and it changes no coordinate by a millionth of its value.
     pub step: NotNegative,
 }
 

@@ -95,6 +95,9 @@ pub(super) fn entries(
             format!("an image has {width} × {height} pixels, and `camera` has {w} × {h}"),
         ));
     }
+    frames
+        .one_time_each(images.iter().map(|image| image.file_name.as_str()))
+        .map_err(|text| fault(file, text))?;
     let classes: HashMap<Id, String> =
         categories.into_iter().map(|category| (category.id, category.name)).collect();
     let names: HashMap<Id, String> = images.into_iter().map(|image| (image.id, image.file_name)).collect();

@@ -94,7 +94,17 @@ impl DetectionFormat {
                     classes.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
                 let labels = folder.join(labels);
                 let mut rows = vec![];
-                for file in text_files(&labels)? {
+                let files = text_files(&labels)?;
+                let names: Vec<String> = files
+                    .iter()
+                    .map(|file| file.file_name().unwrap_or_default().to_string_lossy().into_owned())
+                    .collect();
+                frames.one_time_each(names.iter().map(String::as_str)).map_err(|text| {
+                    let mut problems = ProblemList::of(&labels, "");
+                    problems.push(0, Mistake::Row(text));
+                    problems.into_error()
+                })?;
+                for file in files {
                     let text = read_text(&file)?;
                     let entries = yolo::entries(&file, &text, &classes, &frames, image);
                     rows.extend(listed(&file, &text, entries)?);

@@ -5,6 +5,7 @@ use crate::text::read_text;
 use manifactor_graph::checked::Positive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// A name that is a number above this is a time in nanoseconds: in seconds it would be three million years.
@@ -99,6 +100,28 @@ impl Frames {
         }
     }
 
+    /// Checks that images with different names have different times.
+    ///
+    /// # Errors
+    /// Two names with one time.
+    pub(super) fn one_time_each<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<(), String> {
+        let mut known = HashMap::new();
+        for name in names {
+            // a name without a time is reported with its boxes
+            let Ok(time) = self.time_of_name(name) else { continue };
+            match known.insert(time.to_bits(), name) {
+                Some(other) if other != name => {
+                    return Err(format!(
+                        "the images `{other}` and `{name}` have the same number, the last one in their names: rename them so that \
+                         the number of the image is last, such as `left2_0012.jpg`"
+                    ));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
     /// Returns the time of an image by the name of its file.
     pub(super) fn time_of_name(&self, name: &str) -> Result<f64, Mistake> {
         let stem = Path::new(name).file_name().unwrap_or_default().to_string_lossy();
@@ -106,6 +129,7 @@ impl Frames {
             Some((stem, extension)) if !extension.chars().all(|c| c.is_ascii_digit()) => stem,
             _ => &*stem,
         };
+        let stem = without_export(stem);
         if let Self::Names = self {
             let time = stem.parse::<f64>().ok().filter(|time| time.is_finite());
             let time = time.ok_or_else(|| {
@@ -116,13 +140,13 @@ impl Frames {
             return Ok(if time > NANOSECONDS { 1e-9 * time } else { time });
         }
         self.time(
-            number_of_name(without_export(stem))
+            number_of_name(stem)
                 .map_err(|fault| Mistake::Row(format!("the name of the image `{name}` {fault}")))?,
         )
     }
 }
 
-/// Returns a name without what Roboflow appends: `frame_0012` for `frame_0012_jpg.rf.3f2c…`.
+/// Returns a name without the suffix of an export by Roboflow: `frame_0012` for `frame_0012_jpg.rf.3f2c…`.
 fn without_export(stem: &str) -> &str {
     let Some((exported, hash)) = stem.rsplit_once(".rf.") else { return stem };
     if !hash.chars().all(|c| c.is_ascii_alphanumeric()) {
@@ -131,20 +155,11 @@ fn without_export(stem: &str) -> &str {
     exported.rsplit_once('_').map_or(exported, |(name, _extension)| name)
 }
 
-/// Returns the number of an image: the only one in its name, or the one with most digits, since numbers of images have
-/// leading zeros or become large.
+/// Returns the last number in the name of an image.
 fn number_of_name(stem: &str) -> Result<u64, String> {
-    let numbers: Vec<&str> =
-        stem.split(|c: char| !c.is_ascii_digit()).filter(|digits| !digits.is_empty()).collect();
-    let most = numbers.iter().map(|digits| digits.len()).max().ok_or("has no number")?;
-    let longest: Vec<&str> = numbers.into_iter().filter(|digits| digits.len() == most).collect();
-    match longest[..] {
-        [only] => only.parse().map_err(|_| format!("has the number {only}, which is too large")),
-        _ => Err(format!(
-            "has several numbers, {}: expected one, or one with more digits than the others, such as `left2_0012.jpg`",
-            longest.join(" and ")
-        )),
-    }
+    let digits = stem.rsplit(|c: char| !c.is_ascii_digit()).find(|digits| !digits.is_empty());
+    let digits = digits.ok_or("has no number")?;
+    digits.parse().map_err(|_| format!("has the number {digits}, which is too large"))
 }
 
 fn before_first(number: u64, first: u64) -> Mistake {
@@ -169,10 +184,10 @@ mod tests {
         assert_eq!(rate.time_of_name("cam0/frame_000003.jpg").unwrap(), 5.2);
         let exported = "frame_0007_jpg.rf.0d9c5b3f8e7a4421a1f3b5c7d9e0f102.jpg";
         assert_eq!(rate.time_of_name(exported).unwrap(), 5.6);
-        assert_eq!(rate.time_of_name("frame_0003_left2.png").unwrap(), 5.2);
-        assert_eq!(rate.time_of_name("cam0_03.png").unwrap(), 5.2);
-        let several = rate.time_of_name("cam2_3.png").unwrap_err().to_string();
-        assert!(several.contains("has several numbers, 2 and 3"), "{several}");
+        assert_eq!(rate.time_of_name("cam12_3.png").unwrap(), 5.2);
+        assert!(rate.one_time_each(["frame_0003.png", "frame_0004.png"]).is_ok());
+        let one = rate.one_time_each(["frame_0003_left2.png", "frame_0004_left2.png"]).unwrap_err();
+        assert!(one.contains("`frame_0003_left2.png` and `frame_0004_left2.png`"), "{one}");
         assert!(rate.time_of_name("left.png").unwrap_err().to_string().contains("has no number"));
         assert!(rate.time(0).unwrap_err().to_string().contains("`frames.first`"));
         let list = Frames::List { times: vec![1.0, 2.0], first: 0, file: "times.txt".into() };

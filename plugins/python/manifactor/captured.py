@@ -30,6 +30,7 @@ def captured(function: Callable[..., Any]) -> tuple[Any, ...]:
             elif value.__module__ == function.__module__ and value not in seen:
                 seen.add(value)
                 waiting.append(value)
+                found.append((name, value.__code__))
     return tuple(found)
 
 
@@ -64,6 +65,8 @@ def frozen(value: Any, depth: int = 0) -> tuple[Any, ...]:
     if isinstance(value, bool | int | float | complex | np.generic):
         # NaN is equal to itself as a text
         return (repr(value),)
+    if isinstance(value, str):
+        return (value,)
     if isinstance(value, Variable):
         return (repr(value.to_dict()),)
     if isinstance(value, list | tuple | dict) and len(value) > LONGEST:

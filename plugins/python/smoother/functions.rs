@@ -29,7 +29,7 @@ impl Functions {
                 let other = |(entry, _): &(&FactorEntry, &FactorId)| {
                     function_address(&*entry.factor) == Some(*function)
                 };
-                match graph.factors().iter().zip(&ids).find(other) {
+                match graph.factors().iter().zip(&ids).rev().find(other) {
                     Some((_, other)) => *id = *other,
                     None => return false,
                 }

@@ -49,7 +49,7 @@ impl Descent<'_> {
         }
         let predicted = -0.5 * dot(&step.delta, &self.problem.system.g);
         self.clip(step, predicted);
-        step.predicted > share * self.at.cost
+        step.predicted > share * self.changing_cost()
     }
 
     /// Returns the undetermined direction at the end of a solve with undamped steps, if there was one on

@@ -16,7 +16,7 @@ use manifactor::inertial::diagnosis::Image;
 use manifactor::inertial::visual::{
     InertialState, VisualInertial, VisualInertialDocument, VisualInertialEstimate,
 };
-use manifactor::inertial::{ImuReading, damage};
+use manifactor::inertial::{ImuReading, find_damage};
 use manifactor::slam::metrics::{Alignment, MetricsError, absolute_error, align, associate};
 use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::solve::{AllObservers, Interrupt, Observer};
@@ -74,9 +74,9 @@ impl Vio {
         let errors = truth
             .map(|truth| Ok::<_, MetricsError>([error(&truth, online)?, error(&truth, &estimate.states)?]));
         let errors = errors.transpose().map_err(Failure::input)?;
-        let doubts = doubts(&readings, &estimate);
-        self.print(&estimate, seconds, errors, &doubts, out);
-        let found = if doubts.is_empty() { Status::Done } else { Status::FaultsFound };
+        let warnings = warnings(&readings, document.settings.gravity.get(), &estimate);
+        self.print(&estimate, seconds, errors, &warnings, out);
+        let found = if warnings.is_empty() { Status::Done } else { Status::FaultsFound };
         Ok(found.max(Status::from(&estimate.outcome.termination)))
     }
 
@@ -120,19 +120,19 @@ impl Vio {
 }
 
 /// Returns reasons to doubt an estimate that converged.
-fn doubts(readings: &[ImuReading], estimate: &VisualInertialEstimate) -> Vec<String> {
+fn warnings(readings: &[ImuReading], gravity: f64, estimate: &VisualInertialEstimate) -> Vec<String> {
     /// Largest share of tracks that become no landmark. Points at the border and on wrong tracks are a minority.
     const MAX_SHORT: f64 = 0.5;
-    let mut doubts: Vec<String> = damage(readings).iter().map(ToString::to_string).collect();
+    let mut warnings: Vec<String> = find_damage(readings, gravity).iter().map(ToString::to_string).collect();
     let VisualInertialEstimate { landmarks, short_tracks, .. } = estimate;
     let tracks = landmarks + short_tracks;
     if *short_tracks as f64 > MAX_SHORT * tracks as f64 {
-        doubts.push(format!(
+        warnings.push(format!(
             "{short_tracks} of {tracks} tracks give no landmark, so that the IMU alone determines much of the motion: check that a \
              track keeps its number from image to image, and `body_from_camera` with `manifactor doctor`"
         ));
     }
-    doubts
+    warnings
 }
 
 /// Reads a document, with values that replace its own.

@@ -421,7 +421,8 @@ impl Mcap {
         body_from_camera: Option<Se3>,
         sensor: &str,
     ) -> Result<Se3, TransformError> {
-        if let (None, Some(camera)) = (self.body_from_camera, messages.camera_frame.as_deref()) {
+        let camera = self.camera_frame.as_deref().or(messages.camera_frame.as_deref());
+        if let (None, Some(camera)) = (self.body_from_camera, camera) {
             return messages.transforms.pose(camera, sensor, 0.0);
         }
         let body = self.body_frame.as_deref().or(messages.body_frame.as_deref()).unwrap_or(sensor);
@@ -437,12 +438,14 @@ impl Mcap {
         body_from_camera: Option<Se3>,
     ) -> Result<Option<Vector3<f64>>, McapError> {
         let Some(settings) = &self.fixes else { return Ok(None) };
-        let body = self.body_frame.as_deref().or(messages.body_frame.as_deref()).unwrap_or_default();
         let frame = match (&settings.antenna, &messages.antenna_frame) {
-            (Some(_), _) => body,
-            (None, Some(frame)) => frame,
             // `georeference` reports that there is no position
             (None, None) => return Ok(Some(Vector3::zeros())),
+            (None, Some(frame)) if self.body_from_camera.is_none() => frame,
+            (given, frame) => {
+                let body = self.body_frame(file, messages)?;
+                given.map_or(frame.as_deref().unwrap_or(body), |_| body)
+            }
         };
         let place = self.camera_from_sensor(messages, body_from_camera, frame);
         let no_place = |fault: TransformError| McapError::NoAntenna {

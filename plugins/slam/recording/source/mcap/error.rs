@@ -85,7 +85,7 @@ pub enum McapError {
         fault: Box<str>,
     },
     /// The position of the satellite receiver's antenna is not known.
-    #[error("{}: the position of the antenna is not known: {fault}; `source.fixes.antenna` can give it", file.display())]
+    #[error("{}: the position of the antenna is not known: {fault}; `source.fixes.antenna` can give it if the camera does not move on the body", file.display())]
     NoAntenna {
         /// The recording.
         file: PathBuf,

@@ -107,9 +107,6 @@ struct UsedFix {
     sigma: f64,
 }
 
-/// A position by odometry and one by satellites, without their means, and the weight of the two.
-type WeightedPair = (Vector3<f64>, Vector3<f64>, f64);
-
 /// The odometry with which positions are compared.
 pub(super) struct FixedOdometry<'a> {
     /// Poses of the camera in the odometry frame, sorted by time.
@@ -124,8 +121,8 @@ pub(super) struct FixedOdometry<'a> {
 /// Place of the odometry on the Earth, with the factors of the positions and the index of the image of each.
 pub(super) type Georeferenced = (Georeference, Vec<(usize, PoseFactor)>);
 
-/// Relates positions to the odometry. `antenna` is the position of the antenna in the frame of the camera. What is left
-/// out is added to `unused`.
+/// Relates positions to the odometry. `antenna` is the position of the antenna in the frame of the camera. Positions that are left
+/// out are reported in `unused`.
 ///
 /// # Errors
 /// If no positions can be used, the reason.
@@ -151,7 +148,10 @@ pub(super) fn georeference(
     }
     let of = fixes.len();
     if faulty.0 > 0 {
-        unused.push(format!("{} of {of} positions by satellites are left out: {}", faulty.0, faulty.1));
+        unused.push(format!(
+            "{} of {of} positions by satellites are left out, the first: {}",
+            faulty.0, faulty.1
+        ));
     }
     if away > 0 {
         let gap = odometry.max_gap;
@@ -201,40 +201,88 @@ impl FixedOdometry<'_> {
         })
     }
 
-    /// Returns the pose of the odometry frame with axes east, north and up.
+    /// Returns the pose of the odometry frame with axes east, north and up. Positions that are far off, as after a reflection,
+    /// are left out of this alignment.
     fn align(&self, used: &[UsedFix]) -> Result<Se3, String> {
-        if used.is_empty() {
-            return Err("none of them can be used".into());
+        /// Number of alignments, each without the positions that were far off in the one before.
+        const ALIGNMENTS: usize = 5;
+        /// A position is far off if its distance is larger than this multiple of the median.
+        const FAR: f64 = 4.0;
+        let mut near: Vec<&UsedFix> = used.iter().collect();
+        for _ in 1..ALIGNMENTS {
+            let Some(pose) = Pairs::new(&near, self.up).and_then(|pairs| pairs.align(self.up)) else { break };
+            let distance = |fix: &UsedFix| (pose.act(&fix.by_odometry) - fix.east_north_up).norm();
+            let mut distances: Vec<f64> = used.iter().map(distance).collect();
+            distances.sort_by(f64::total_cmp);
+            let most = (FAR * distances[distances.len() / 2]).max(f64::MIN_POSITIVE);
+            near = used.iter().filter(|fix| distance(fix) <= most).collect();
         }
-        let count = used.len() as f64;
-        let mean = |x: fn(&UsedFix) -> Vector3<f64>| used.iter().map(x).sum::<Vector3<f64>>() / count;
+        let pairs = Pairs::new(&near, self.up).ok_or("none of them can be used")?;
+        pairs.check(self.up)?;
+        pairs.align(self.up).ok_or_else(|| "they do not determine a rotation".into())
+    }
+}
+
+/// Positions by odometry and by satellites, without their means. If up is known, only their horizontal parts.
+struct Pairs {
+    means: [Vector3<f64>; 2],
+    pairs: Vec<(Vector3<f64>, Vector3<f64>)>,
+    /// Root mean square of the standard deviations. Unit: metres.
+    sigma: f64,
+}
+
+impl Pairs {
+    /// Returns `None` without a position.
+    fn new(fixes: &[&UsedFix], up: Option<Direction>) -> Option<Self> {
+        if fixes.is_empty() {
+            return None;
+        }
+        let count = fixes.len() as f64;
+        let mean =
+            |x: fn(&UsedFix) -> Vector3<f64>| fixes.iter().map(|fix| x(fix)).sum::<Vector3<f64>>() / count;
         let means = [mean(|fix| fix.by_odometry), mean(|fix| fix.east_north_up)];
         let horizontal = |x: Vector3<f64>, up: Option<Direction>| match up {
             Some(up) => x - *up * up.dot(&x),
             None => x,
         };
-        let pairs = used.iter().map(|fix| -> WeightedPair {
-            let x = horizontal(fix.by_odometry - means[0], self.up);
-            let y = horizontal(fix.east_north_up - means[1], self.up.map(|_| Direction::Z));
-            (x, y, 1.0)
-        });
-        let extents = |of: fn(&WeightedPair) -> Vector3<f64>| {
-            let scatter: Matrix3<f64> = pairs.clone().map(|pair| of(&pair) * of(&pair).transpose()).sum();
-            let mut extents: [f64; 3] =
-                scatter.symmetric_eigen().eigenvalues.map(|x| x.max(0.0).sqrt()).into();
-            extents.sort_by(|a, b| b.total_cmp(a));
-            extents
+        let pair = |fix: &&UsedFix| {
+            let x = horizontal(fix.by_odometry - means[0], up);
+            (x, horizontal(fix.east_north_up - means[1], up.map(|_| Direction::Z)))
         };
-        let [by_odometry, by_fixes] = [extents(|pair| pair.0), extents(|pair| pair.1)];
-        let sigma = used.iter().map(|fix| fix.sigma * fix.sigma).sum::<f64>() / count;
-        let sigma = sigma.sqrt();
-        let [moved, measured] = [by_odometry[0], by_fixes[0]].map(|extent| extent / count.sqrt());
+        let sigma = (fixes.iter().map(|fix| fix.sigma * fix.sigma).sum::<f64>() / count).sqrt();
+        Some(Self { means, pairs: fixes.iter().map(pair).collect(), sigma })
+    }
+
+    /// Returns the rigid motion from the odometry to east, north and up; `None` if it is not determined.
+    fn align(&self, up: Option<Direction>) -> Option<Se3> {
+        let mut all = PointPairs::new(self.pairs.iter().map(|(x, y)| (*x, *y, 1.0)));
+        if let Some(up) = up {
+            all.add_direction(&up, &Vector3::z(), 1.0);
+        }
+        let rotation = all.rigid(0.0)?.rotation;
+        Some(Se3::new(rotation, self.means[1] - rotation.act(&self.means[0])))
+    }
+
+    /// Returns the extents along the principal axes, the largest first, as sums over all positions. Unit: metres.
+    fn extents(&self, of: impl Fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>) -> [f64; 3] {
+        let scatter: Matrix3<f64> = self.pairs.iter().map(|pair| of(pair) * of(pair).transpose()).sum();
+        let mut extents: [f64; 3] = scatter.symmetric_eigen().eigenvalues.map(|x| x.max(0.0).sqrt()).into();
+        extents.sort_by(|a, b| b.total_cmp(a));
+        extents
+    }
+
+    /// Checks that the positions determine the rotation, and have the extent of the odometry.
+    fn check(&self, up: Option<Direction>) -> Result<(), String> {
+        let sigma = self.sigma;
+        let [by_odometry, by_fixes] = [self.extents(|pair| pair.0), self.extents(|pair| pair.1)];
+        let root = (self.pairs.len() as f64).sqrt();
+        let [moved, measured] = [by_odometry[0], by_fixes[0]].map(|extent| extent / root);
         if sigma > MAX_ROTATION_SIGMA * by_odometry[0] {
             return Err(format!(
                 "their noise of {sigma:.1} m does not show the direction of a path with an extent of {moved:.2} m"
             ));
         }
-        if self.up.is_none() && sigma > MAX_ROTATION_SIGMA * by_odometry[1] {
+        if up.is_none() && sigma > MAX_ROTATION_SIGMA * by_odometry[1] {
             return Err("they are on a line, and leave the rotation about it open: set `source.up`".into());
         }
         if measured - 3.0 * sigma > MAX_EXTENT_RATIO * moved
@@ -244,12 +292,6 @@ impl FixedOdometry<'_> {
                 "they have an extent of {measured:.2} m, and the odometry of {moved:.2} m: is its unit metres?"
             ));
         }
-        let mut all = PointPairs::new(pairs);
-        if let Some(up) = self.up {
-            all.add_direction(&up, &Vector3::z(), 1.0);
-        }
-        let rotation = all.rigid(0.0).ok_or("they do not determine a rotation")?.rotation;
-        let translation = means[1] - rotation.act(&means[0]);
-        Ok(Se3::new(rotation, translation))
+        Ok(())
     }
 }

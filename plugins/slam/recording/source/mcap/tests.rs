@@ -400,9 +400,14 @@ mod recordings {
         says(&found, "2 messages of `/fix` are left out: the receiver has no position");
         says(
             &found,
-            "1 of 16 positions by satellites are left out: the receiver does not know its covariance",
+            "1 of 16 positions by satellites are left out, the first: the receiver does not know its covariance",
         );
         says(&found, "1 of 16 positions by satellites are left out: they are not between two poses");
+        // one position is off by kilometres
+        let mut reflected = fixes(Some(0.02));
+        reflected[6].2 = fix_message(101.2, "gps", 0, [at[0] + 0.1, at[1], at[2]], Some(0.02));
+        let place = with(level(), reflected).georeference.unwrap();
+        assert!(place.enu_from_odometry.rotation.local(&enu_from_odometry().rotation).norm() < 1e-3);
         for (settings, fixes, words) in [
             (level(), fixes(None), "set `source.fixes.sigma`"),
             (level(), fixes(Some(5.0)), "does not show the direction of a path"),
