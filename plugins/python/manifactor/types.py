@@ -166,9 +166,10 @@ class Stopping(TypedDict, total=False):
     relative_cost: Number
     #: Stop once the cost is below this. For coordinates below one it shrinks with their square.
     absolute_cost: Number
-    #: Stop once no entry of the gradient is larger than this.
+    #: Stop once no entry of the gradient is larger than this, and no single unknown could lower the cost by a
+    #: thousandth.
     gradient: Number
-    #: Stop once the Euclidean norm of a step is below this.
+    #: Stop once the Euclidean norm of a step is below this, and it changes no coordinate by a millionth of its value.
     step: Number
 
 
