@@ -169,7 +169,8 @@ class Stopping(TypedDict, total=False):
     #: Stop once no entry of the gradient is larger than this, and no single unknown could lower the cost by a
     #: thousandth.
     gradient: Number
-    #: Stop once the Euclidean norm of a step is below this, and it changes no coordinate by a millionth of its value.
+    #: Stop once the Euclidean norm of a step is below this, and it changes no coordinate by a millionth of
+    #: its value.
     step: Number
 
 
