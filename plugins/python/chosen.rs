@@ -1,5 +1,4 @@
 //! Registered types as Python objects: factors, losses, solvers, starts and values of variables.
-use crate::batch::function_address;
 use crate::errors::{self, Mistake};
 use crate::input::{
     Untagged, array, json_to_python, node, numbers, plain_node, to_array, to_python, unchangeable,
@@ -85,7 +84,7 @@ impl What {
     /// Returns whether both are equal; factors of Python functions are equal only to themselves.
     fn equals(&self, other: &Self) -> PyResult<bool> {
         match (self, other) {
-            (Self::Factor(x), Self::Factor(y)) => same_factor(&**x, &**y),
+            (Self::Factor(x), Self::Factor(y)) => Ok(same_factor(&**x, &**y)),
             _ => Ok(self.names() == other.names() && self.json()? == other.json()?),
         }
     }
@@ -223,14 +222,12 @@ impl Chosen {
 }
 
 /// Returns whether factors are equal; factors of Python functions are equal only to themselves.
-pub(crate) fn same_factor(x: &dyn Factor, y: &dyn Factor) -> PyResult<bool> {
-    if function_address(x).is_some() || function_address(y).is_some() {
-        return Ok(std::ptr::addr_eq(x, y));
+pub(crate) fn same_factor(x: &dyn Factor, y: &dyn Factor) -> bool {
+    match (serde_json::to_value(x), serde_json::to_value(y)) {
+        (Ok(a), Ok(b)) => x.typetag_name() == y.typetag_name() && a == b,
+        // a Python function cannot be written
+        _ => std::ptr::addr_eq(x, y),
     }
-    let json = |of: &dyn Factor| {
-        serde_json::to_value(of).map_err(|error| errors::argument(of.typetag_name(), "", error))
-    };
-    Ok(x.typetag_name() == y.typetag_name() && json(x)? == json(y)?)
 }
 
 /// Reads an object from its fields, as in a document.
@@ -322,6 +319,18 @@ fn untagged<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         Ok(What::Variable(x)) => Ok(Bound::new(value.py(), Untagged(x.clone()))?.into_any()),
         _ => Ok(value.clone()),
     }
+}
+
+/// Returns the fields of a type with values that do not name their types; only constants of a formula do.
+pub(crate) fn untagged_fields<'py>(name: &str, fields: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyDict>> {
+    if name == "expression" {
+        return Ok(fields.clone());
+    }
+    let plain = PyDict::new(fields.py());
+    for (field, value) in fields {
+        plain.set_item(field, untagged(&value)?)?;
+    }
+    Ok(plain)
 }
 
 /// Returns the type of this kind and name, or an error that names similar ones.

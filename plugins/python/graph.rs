@@ -5,7 +5,7 @@ mod noise;
 mod shared;
 mod values;
 
-use crate::chosen::{factor, known, loss};
+use crate::chosen::{factor, known, loss, untagged_fields};
 use crate::errors;
 use crate::input::{Columns, dict_of, key_of, key_rows, keys};
 use crate::threads::detach;
@@ -397,7 +397,7 @@ impl Factors {
 
     fn read(name: String, rows: usize, fields: &Bound<'_, PyDict>) -> PyResult<Self> {
         known("factor", &name)?;
-        let mut columns = Columns::new(&name, rows, fields)?;
+        let mut columns = Columns::new(&name, rows, &untagged_fields(&name, fields)?)?;
         if columns.is_constant() && rows > 0 {
             return Ok(Self::Same(read(&name, &mut columns, 0)?));
         }

@@ -1,5 +1,5 @@
 //! Arrays of values of one type.
-use crate::chosen::{Chosen, What, known};
+use crate::chosen::{Chosen, What, known, untagged_fields};
 use crate::errors;
 use crate::input::{Columns, array_like, fields, to_array};
 use manifactor::graph::Variable;
@@ -187,7 +187,7 @@ fn array_from_fields<'py>(name: &str, fields: &Bound<'py, PyDict>) -> PyResult<B
     };
     known("variable", name)?;
     let entry = find("variable", name).ok_or_else(|| errors::internal(name))?;
-    let mut columns = Columns::new(name, rows, fields)?;
+    let mut columns = Columns::new(name, rows, &untagged_fields(name, fields)?)?;
     let read = |row| {
         let read = entry.read::<dyn Variable>(columns.row(row));
         read.map(Arc::from).map_err(|error| errors::row(name, row, &error, "fields"))

@@ -152,7 +152,7 @@ impl FactorEntry {
             && entry.name == other_entry.name
             && entry.noise == other_entry.noise
             && loss(self).map_err(errors::internal)? == loss(other).map_err(errors::internal)?
-            && same_factor(&*entry.factor, &*other_entry.factor)?)
+            && same_factor(&*entry.factor, &*other_entry.factor))
     }
 
     fn json(&self) -> PyResult<serde_json::Value> {

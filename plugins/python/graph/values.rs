@@ -1,7 +1,7 @@
 //! Values of variables.
 use super::{Reduced, Shared, html, pickled, unpickled};
 use crate::algebra::ValueArray;
-use crate::chosen::{What, known, variable};
+use crate::chosen::{What, known, untagged_fields, variable};
 use crate::errors;
 use crate::input::{Columns, dict_of, fields, key_of, key_rows};
 use indexmap::IndexMap;
@@ -242,7 +242,7 @@ impl Rows {
             return Err(errors::argument("insert_many", "fields", message));
         };
         let entry = find("variable", &name).ok_or_else(|| errors::internal(&name))?;
-        Ok(Self::Read { entry, columns: Columns::new(&name, rows, fields)? })
+        Ok(Self::Read { entry, columns: Columns::new(&name, rows, &untagged_fields(&name, fields)?)? })
     }
 
     fn row(&mut self, row: usize) -> PyResult<Box<dyn Variable>> {

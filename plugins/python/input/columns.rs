@@ -1,7 +1,6 @@
 //! Fields of many factors or values at once: arrays have one row per item, everything else is shared.
 use super::arrays::{Numbers, any_numbers, array_like};
-use super::node::{Untagged, array_node, node, number, within};
-use crate::chosen::{Chosen, What};
+use super::node::{array_node, node, number, within};
 use crate::errors::{self, Mistake};
 use manifactor::config::{Field, Node, Place, SourceText, Table, Value};
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
@@ -96,12 +95,7 @@ fn table(
         }
         let inner = within(path, &name);
         steps.push(table.len());
-        let node = if what != "expression"
-            && let Ok(Chosen(What::Variable(shared))) = value.cast::<Chosen>().map(Bound::get)
-        {
-            // the field has one type; only constants of a formula name theirs
-            Untagged(shared.clone()).node(&place(&inner))?
-        } else if value.hasattr("__manifactor_columns__")? {
+        let node = if value.hasattr("__manifactor_columns__")? {
             // an array of values
             let fields = value.call_method0("__manifactor_columns__")?;
             self::table(what, rows, &inner, fields.cast()?, steps, columns)?
