@@ -217,12 +217,8 @@ impl Graph {
     /// are those at the current estimate of the variable.
     pub fn fix_directions(&mut self, key: impl Into<Key>, directions: &[&str]) {
         let key = key.into();
-        let directions = Fixed::Directions(directions.iter().map(|d| (*d).to_owned()).collect());
-        let fixed = match self.fixed.get(&key) {
-            Some(before) => before.clone().with(directions),
-            None => directions,
-        };
-        self.set_fixed(key, fixed);
+        let before = self.fixed.get(&key).cloned().unwrap_or_default();
+        self.set_fixed(key, before.with_directions(directions));
     }
     /// Sets the fixed part of a variable.
     pub fn set_fixed(&mut self, key: impl Into<Key>, fixed: Fixed) {

@@ -87,16 +87,17 @@ impl Problem {
         let variables = &self.model.variables;
         let is_fixed =
             |variable: &u32| variables[*variable as usize].unknowns().all(|unknown| unknown.is_none());
-        let is_constant: Vec<bool> =
-            self.model.factors.iter().map(|factor| factor.variables.iter().all(is_fixed)).collect();
-        if !is_constant.contains(&true) {
+        let constant = || {
+            let factors = self.model.factors.iter().enumerate();
+            factors.filter(|(_, factor)| factor.variables.iter().all(is_fixed)).map(|(i, _)| i)
+        };
+        if constant().next().is_none() {
             return 0.0;
         }
         let mut costs = vec![];
         self.model.factor_costs(&mut costs);
         let weights = self.model.weights();
-        let weighted = costs.iter().enumerate().map(|(i, cost)| weights.get(i).unwrap_or(&1.0) * cost);
-        weighted.zip(is_constant).filter(|(_, is_constant)| *is_constant).map(|(cost, _)| cost).sum()
+        constant().map(|i| weights.get(i).unwrap_or(&1.0) * costs[i]).sum()
     }
 
     /// Returns the coordinate to which each scalar unknown adds; `None` for unknowns without one, such as rotations.

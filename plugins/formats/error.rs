@@ -237,6 +237,12 @@ impl<'a> ProblemList<'a> {
     pub(crate) fn finish(self) -> Result<(), FormatError> {
         if self.is_empty() { Ok(()) } else { Err(self.into_error()) }
     }
+    /// Returns the error of a file with one mistake.
+    pub(crate) fn single(path: &'a Path, text: &'a str, line: usize, mistake: Mistake) -> FormatError {
+        let mut problems = Self::of(path, text);
+        problems.push(line, mistake);
+        problems.into_error()
+    }
     pub(crate) fn into_error(self) -> FormatError {
         let Self { path, text, list: mut problems, more } = self;
         // Several passes over a file may report its lines out of order.

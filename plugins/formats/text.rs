@@ -26,9 +26,8 @@ pub fn read_text(path: &Path) -> Result<String, FormatError> {
         // The valid part of the content is shown.
         let text = String::from_utf8_lossy(error.as_bytes());
         let good = error.as_bytes().iter().take(error.utf8_error().valid_up_to());
-        let mut problems = ProblemList::of(path, &text);
-        problems.push(1 + good.filter(|b| **b == b'\n').count(), Mistake::NotText);
-        problems.into_error()
+        let line = 1 + good.filter(|b| **b == b'\n').count();
+        ProblemList::single(path, &text, line, Mistake::NotText)
     })
 }
 

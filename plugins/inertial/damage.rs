@@ -66,9 +66,11 @@ pub fn find_damage(readings: &[ImuReading], gravity: f64) -> Vec<Damage> {
     ];
     let mut found: Vec<Damage> = repeated(readings, gravity).into_iter().collect();
     let sensors: [fn(&ImuReading) -> Vector3<f64>; 2] = [|r| r.gyroscope, |r| r.accelerometer];
-    for (sensor, names) in sensors.into_iter().zip(AXES) {
+    // a gyroscope at rest has no value that it keeps
+    let at_rest = [f64::INFINITY, gravity];
+    for ((sensor, at_rest), names) in sensors.into_iter().zip(at_rest).zip(AXES) {
         for (axis, name) in names.into_iter().enumerate() {
-            found.extend(saturated(readings, &sensor, axis, name));
+            found.extend(saturated(readings, &sensor, axis, name, at_rest));
         }
     }
     found
@@ -112,6 +114,7 @@ fn saturated(
     sensor: &impl Fn(&ImuReading) -> Vector3<f64>,
     axis: usize,
     name: &'static str,
+    at_rest: f64,
 ) -> Vec<Damage> {
     let values: Vec<Vector3<f64>> = readings.iter().map(sensor).collect();
     let own = || values.iter().map(|value| value[axis]);
@@ -130,7 +133,10 @@ fn saturated(
         let count = long.iter().map(|(_, length)| length).sum();
         Some(Damage { kind, readings: count, from: readings[*first].timestamp })
     };
-    let is_far = |limit: &f64| limit.is_finite() && limit.abs() >= MIN_STEPS * resolution;
+    // without noise, an accelerometer that stays level measures gravity, or nothing, along an axis
+    let is_rest =
+        |limit: f64| limit.abs() < MIN_STEPS * resolution || (limit.abs() / at_rest - 1.0).abs() < REST_SHARE;
+    let is_far = |limit: &f64| limit.is_finite() && !is_rest(*limit);
     extremes.into_iter().filter(is_far).filter_map(stays).collect()
 }
 

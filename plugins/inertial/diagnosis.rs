@@ -30,10 +30,6 @@ const MIN_GAIN: f64 = 40.0;
 const MIN_SHARE: f64 = 0.05;
 /// Smallest gain by points that come before the camera, as a share of the cost of those behind it.
 const MIN_BEHIND: f64 = 0.25;
-/// Smallest such gain for axes of the accelerometer, per point of the recording. A velocity that is not known well puts
-/// some points behind the camera, and one of many axes brings a part of them before it by chance: by up to 0.34 per point
-/// in parts of a flight without a fault, where planted axes gain 0.59 to 2.1.
-const MIN_BEHIND_PER_POINT: f64 = 0.45;
 /// Minimum number of pairs of images.
 const MIN_PAIRS: usize = 10;
 /// Faults are first judged with every third pair of images, and the best ones again with all.
@@ -378,21 +374,23 @@ impl Recording {
                 Fault::AccelerometerSign | Fault::AccelerometerAxes { .. } | Fault::MountingInMillimetres
             )
         };
-        let judge = |fault: Fault| {
-            let judged = self.judge(null, 1, fault);
+        let judge = |fault: Fault| self.judge(null, 1, fault);
+        // the right axes fit a constant gravity better too; one of many others brings points before the camera by chance, if
+        // the velocity is not known well
+        let fits_gravity =
+            |judged: &Judged| !matches!(judged.fault, Fault::AccelerometerAxes { .. }) || judged.gain > 0.0;
+        let with_points = |judged: Judged| {
             let corrected = gravity::behind(&self.corrected(&judged.fault), &pairs, &null.rotation);
             (judged.gain + behind.cost - corrected.cost, judged.fault, corrected.points)
         };
-        let least = MIN_BEHIND * behind.cost;
-        let least_for_axes = least.max(MIN_BEHIND_PER_POINT * null.rotation.points as f64);
         let is_probable = |(gain, fault, _): &(f64, Fault, usize)| match fault {
             Fault::MountingInMillimetres => *gain >= MIN_GAIN,
-            Fault::AccelerometerAxes { .. } => *gain >= least_for_axes,
-            _ => *gain >= least,
+            _ => *gain >= MIN_BEHIND * behind.cost,
         };
         let is_new = |fault: &Fault| is_new(fault, found_before);
-        let judged = Fault::all(self).into_iter().filter(moves).filter(is_new).map(judge);
-        let probable: Vec<(f64, Fault, usize)> = judged.filter(is_probable).collect();
+        let judged =
+            Fault::all(self).into_iter().filter(moves).filter(is_new).map(judge).filter(fits_gravity);
+        let probable: Vec<(f64, Fault, usize)> = judged.map(with_points).filter(is_probable).collect();
         let most = probable.iter().fold(0.0, |most, (gain, ..)| f64::max(most, *gain));
         // the first ones are the simplest
         let best = probable.iter().position(|(gain, fault, _)| match fault {

@@ -14,20 +14,6 @@ pub enum Fixed {
     Directions(Vec<String>),
 }
 
-impl Fixed {
-    /// Returns the union of both.
-    pub(super) fn with(self, other: Self) -> Self {
-        match (self, other) {
-            (Self::Directions(mut names), Self::Directions(more)) => {
-                names.extend(more.into_iter().filter(|name| !names.contains(name)).collect::<Vec<_>>());
-                Self::Directions(names)
-            }
-            (Self::Whole(true), _) | (_, Self::Whole(true)) => Self::Whole(true),
-            (Self::Whole(false), other) | (other, Self::Whole(false)) => other,
-        }
-    }
-}
-
 impl<'de> Deserialize<'de> for Fixed {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         struct FixedVisitor;
@@ -54,6 +40,21 @@ impl Default for Fixed {
 }
 
 impl Fixed {
+    /// Returns what is fixed, together with these directions.
+    pub(super) fn with_directions(self, more: &[&str]) -> Self {
+        let mut names = match self {
+            Self::Whole(true) => return self,
+            Self::Whole(false) => vec![],
+            Self::Directions(names) => names,
+        };
+        for name in more {
+            if !names.iter().any(|known| known == name) {
+                names.push((*name).to_owned());
+            }
+        }
+        Self::Directions(names)
+    }
+
     /// Returns one bit for each tangent direction, set if the direction is fixed.
     pub fn bits(&self, tangent: &[&str]) -> u32 {
         let bit = |name: &str| tangent.iter().position(|t| *t == name).map_or(0, |i| 1 << i);
@@ -82,9 +83,9 @@ mod tests {
     fn what_is_fixed_adds_up() {
         let directions =
             |names: &[&str]| Fixed::Directions(names.iter().map(|name| (*name).to_owned()).collect());
-        assert_eq!(directions(&["x"]).with(directions(&["y", "x"])), directions(&["x", "y"]));
-        assert_eq!(directions(&["x"]).with(Fixed::Whole(true)), Fixed::Whole(true));
-        assert_eq!(Fixed::Whole(false).with(directions(&["x"])), directions(&["x"]));
+        assert_eq!(directions(&["x"]).with_directions(&["y", "x"]), directions(&["x", "y"]));
+        assert_eq!(Fixed::Whole(true).with_directions(&["x"]), Fixed::Whole(true));
+        assert_eq!(Fixed::default().with_directions(&["x"]), directions(&["x"]));
         assert_eq!(directions(&["x", "z"]).unknown_directions(&["x", "y"]).collect::<Vec<_>>(), ["z"]);
     }
 }

@@ -50,11 +50,10 @@ struct DataSet {
 }
 
 fn parse<T: serde::de::DeserializeOwned>(file: &Path, text: &str) -> Result<T, FormatError> {
-    serde_json::from_str(text).map_err(|error| {
-        let mut problems = ProblemList::of(file, text);
-        problems.push(error.line(), Mistake::Row(error.to_string()));
-        problems.into_error()
-    })
+    let fault = |error: serde_json::Error| {
+        ProblemList::single(file, text, error.line(), Mistake::Row(error.to_string()))
+    };
+    serde_json::from_str(text).map_err(fault)
 }
 
 /// Returns the boxes of a file. `images` is the file with the images of a list of results.
@@ -65,11 +64,7 @@ pub(super) fn entries(
     frames: &Frames,
     size: [u32; 2],
 ) -> Result<Vec<Entry>, FormatError> {
-    let fault = |file: &Path, fault: String| {
-        let mut problems = ProblemList::of(file, text);
-        problems.push(0, Mistake::Row(fault));
-        problems.into_error()
-    };
+    let fault = |file: &Path, fault: String| ProblemList::single(file, text, 0, Mistake::Row(fault));
     let is_list = text.trim_start().starts_with('[');
     let (named, annotations) = match images {
         Some(images) => {

@@ -99,11 +99,9 @@ impl DetectionFormat {
                     .iter()
                     .map(|file| file.file_name().unwrap_or_default().to_string_lossy().into_owned())
                     .collect();
-                frames.one_time_each(names.iter().map(String::as_str)).map_err(|text| {
-                    let mut problems = ProblemList::of(&labels, "");
-                    problems.push(0, Mistake::Row(text));
-                    problems.into_error()
-                })?;
+                frames
+                    .one_time_each(names.iter().map(String::as_str))
+                    .map_err(|text| ProblemList::single(&labels, "", 0, Mistake::Row(text)))?;
                 for file in files {
                     let text = read_text(&file)?;
                     let entries = yolo::entries(&file, &text, &classes, &frames, image);

@@ -64,10 +64,8 @@ impl Frames {
                 Ok(Self::List { times, first, file })
             }
             _ => {
-                let mut problems = ProblemList::of(folder, "");
                 let text = "`frames` needs either `rate` or `times`";
-                problems.push(0, Mistake::Row(text.into()));
-                Err(problems.into_error())
+                Err(ProblemList::single(folder, "", 0, Mistake::Row(text.into())))
             }
         }
     }

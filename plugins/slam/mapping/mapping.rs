@@ -264,10 +264,9 @@ impl Mapping {
             }
         }
         if self.mapped().next().is_none() {
-            let unread =
-                sequence.unused.iter().filter(|unused| matches!(unused, UnusedInput::Box { .. })).count();
-            self.warnings.push(match (sequence.detections.len(), unread) {
-                (0, 1..) => Warning::NoReadableBoxes { boxes: unread },
+            let unused = sequence.unused.iter().map(UnusedInput::boxes).sum();
+            self.warnings.push(match (sequence.detections.len(), unused) {
+                (0, 1..) => Warning::NoUsableBoxes { boxes: unused },
                 (boxes, _) => Warning::NoObjects { boxes, detected: self.objects.len() },
             });
         } else if !settings.association.uses_source_ids() && settings.detections.loss.is_none() {

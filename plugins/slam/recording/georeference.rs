@@ -1,6 +1,6 @@
 //! Place of a map on the Earth.
 use manifactor_geometry::{Prior, Se3};
-use manifactor_graph::{Direction, FactorEntry, Graph, Noise, Values};
+use manifactor_graph::{FactorEntry, Graph, Noise, Values};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -59,24 +59,21 @@ pub struct Georeference {
     pub origin: Geodetic,
     /// Pose of the odometry frame in the frame with east, north and up, from a first alignment.
     pub enu_from_odometry: Se3,
-    /// Up direction in the odometry frame, if known.
-    pub up: Option<Direction>,
+    /// True if the alignment is level, because the up direction of the odometry is known.
+    pub is_level: bool,
 }
 
 impl Georeference {
-    /// Adds [`ENU_FROM_MAP`] to a graph, with a weak prior: 57° about each axis, or 3° about horizontal axes if the up
-    /// direction is known, and 1 km.
+    /// Adds [`ENU_FROM_MAP`] to a graph, with a weak prior: 57° about each axis, or 3° about horizontal axes of a level
+    /// alignment, and 1 km.
     pub fn add_to(&self, map_from_odometry: &Se3, graph: &mut Graph, values: &mut Values) {
         let value = self.enu_from_odometry.compose(&map_from_odometry.inverse());
         let mut covariance = DMatrix::zeros(6, 6);
-        let rotation = match self.up {
-            None => Matrix3::identity() * UNKNOWN_RAD.powi(2),
-            Some(up) => {
-                let up = map_from_odometry.rotation.act(&up);
-                let about_up = up * up.transpose();
-                about_up * UNKNOWN_RAD.powi(2) + (Matrix3::identity() - about_up) * LEVEL_RAD.powi(2)
-            }
-        };
+        // up in the map, whose rotation is the tangent of the variable
+        let up = value.rotation.inverse().act(&Vector3::z());
+        let about_up = up * up.transpose();
+        let tilt = if self.is_level { LEVEL_RAD } else { UNKNOWN_RAD };
+        let rotation = about_up * UNKNOWN_RAD.powi(2) + (Matrix3::identity() - about_up) * tilt.powi(2);
         covariance.view_mut((0, 0), (3, 3)).copy_from(&rotation);
         covariance.view_mut((3, 3), (3, 3)).fill_diagonal(POSITION_M.powi(2));
         values.insert(ENU_FROM_MAP, value);
@@ -117,7 +114,7 @@ mod tests {
         let origin = Geodetic { latitude: 48.137, longitude: 11.575, altitude: 519.0 };
         let enu_from_odometry = Se3::exp(&Vector6::new(0.0, 0.0, 1.0, 3.0, 4.0, 5.0));
         let map_from_odometry = Se3::exp(&Vector6::new(0.9, -0.3, 0.4, 1.0, 2.0, 3.0));
-        let georeference = Georeference { origin, enu_from_odometry, up: Some(Direction::Z) };
+        let georeference = Georeference { origin, enu_from_odometry, is_level: true };
         let (mut graph, mut values) = (Graph::new(), Values::new());
         georeference.add_to(&map_from_odometry, &mut graph, &mut values);
         let value = values.get::<Se3>(ENU_FROM_MAP).unwrap();

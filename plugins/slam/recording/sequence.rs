@@ -86,6 +86,18 @@ pub enum UnusedInput {
     },
 }
 
+impl UnusedInput {
+    /// Returns the number of boxes that are not used for this reason.
+    pub fn boxes(&self) -> usize {
+        match self {
+            Self::WithoutPose(without) => without.rows,
+            Self::Box { .. } => 1,
+            Self::Image { boxes, .. } => *boxes,
+            Self::Recording(_) | Self::PoseGraph { .. } => 0,
+        }
+    }
+}
+
 /// Detections whose time has no pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DetectionsWithoutPose {

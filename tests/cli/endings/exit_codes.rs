@@ -102,7 +102,7 @@ fn codes(ending: &str) -> Vec<i32> {
             assert_eq!(code(run), 0);
             codes(&[&format!("{run} {small}")])
         }
-        "there are boxes, and none can be read" => {
+        "there are boxes, and none can be used" => {
             let simulated = run(["simulate", &at("seen.toml"), "--lines"], &[]).stdout;
             let in_percent = |line: &str| {
                 let mut frame: serde_json::Value = serde_json::from_str(line).unwrap();

@@ -106,8 +106,8 @@ pub enum Warning {
         /// Gain in log-likelihood.
         gain: f64,
     },
-    /// None of the boxes can be read.
-    NoReadableBoxes {
+    /// None of the boxes can be used: they cannot be read, or have no pose.
+    NoUsableBoxes {
         /// Number of boxes.
         boxes: usize,
     },
@@ -181,7 +181,7 @@ impl Warning {
             Self::TooManyUnused { .. }
                 | Self::OutsideImage { .. }
                 | Self::NormalizedBoxes { .. }
-                | Self::NoReadableBoxes { .. }
+                | Self::NoUsableBoxes { .. }
         )
     }
 }
@@ -227,8 +227,8 @@ impl fmt::Display for Warning {
                  and y by the height, {height}"
             ),
             Self::NotMapped { what, remedy } => write!(f, "not mapped: {what}; {remedy}"),
-            Self::NoReadableBoxes { boxes } => {
-                write!(f, "none of {boxes} boxes can be read, so the map has no objects")
+            Self::NoUsableBoxes { boxes } => {
+                write!(f, "none of {boxes} boxes can be used, so the map has no objects")
             }
             Self::NoObjects { boxes: 0, .. } => f.write_str("the source has no boxes, so the map has no objects"),
             Self::NoObjects { detected: 0, .. } => f.write_str(

@@ -15,7 +15,7 @@ use manifactor_geometry::Se3;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::BoundingBox;
-use manifactor_ros::{Contents, Role, TransformError};
+use manifactor_ros::{Contents, Role};
 use nalgebra::Vector3;
 use recorded_messages::{BoxesOfImage, Calibration, RecordedMessages};
 use schemars::JsonSchema;
@@ -146,7 +146,6 @@ impl SequenceSource for Mcap {
         let lens = self.lens(&file, self.camera.as_ref(), messages.calibrations.first(), folders)?;
         let (poses, body_from_camera) = self.camera_poses(&file, &mut messages)?;
         let accelerometer = self.accelerometer(&file, &mut messages, body_from_camera)?;
-        let antenna = self.antenna(&file, &messages, body_from_camera)?;
         if let (Some(pose), Some(truth)) = (body_from_camera, &mut ground_truth) {
             Extrinsics::new(pose).apply_to_ground_truth(truth);
         }
@@ -173,7 +172,8 @@ impl SequenceSource for Mcap {
         rig.apply(&mut detections)?;
         unused.extend(without);
         let (mut georeference, mut pose_factors) = (None, vec![]);
-        if let (Some(settings), Some(antenna)) = (&self.fixes, antenna) {
+        if let Some(settings) = &self.fixes {
+            let antenna = self.antenna(&file, &messages, settings, body_from_camera)?;
             let max_gap = self.max_pose_gap.get();
             let odometry = FixedOdometry { poses: &poses, frames: &frames, max_gap, up: self.up };
             match fixes::georeference(&messages.fixes, settings, &antenna, &odometry, &mut messages.unused) {
@@ -394,7 +394,7 @@ impl Mcap {
         body_from_camera: Option<Se3>,
     ) -> Result<Vec<Acceleration>, McapError> {
         let Some(sensor) = messages.imu_frame.clone() else { return Ok(vec![]) };
-        match self.camera_from_sensor(messages, body_from_camera, &sensor) {
+        match self.camera_from_sensor(file, messages, body_from_camera, &sensor) {
             Ok(camera_from_sensor) => {
                 let mut readings = std::mem::take(&mut messages.accelerometer);
                 for reading in &mut readings {
@@ -404,7 +404,7 @@ impl Mcap {
                 Ok(readings)
             }
             Err(fault) if self.imu.is_some() => {
-                Err(McapError::NoImuTransform { file: file.to_owned(), fault: fault.to_string().into() })
+                Err(McapError::NoImuTransform { file: file.to_owned(), fault })
             }
             Err(fault) => {
                 let count = messages.accelerometer.len();
@@ -415,45 +415,44 @@ impl Mcap {
     }
 
     /// Returns the pose of a sensor in the frame of the camera.
+    ///
+    /// # Errors
+    /// The reason, as a text.
     fn camera_from_sensor(
-        &self,
-        messages: &RecordedMessages,
-        body_from_camera: Option<Se3>,
-        sensor: &str,
-    ) -> Result<Se3, TransformError> {
-        let camera = self.camera_frame.as_deref().or(messages.camera_frame.as_deref());
-        if let (None, Some(camera)) = (self.body_from_camera, camera) {
-            return messages.transforms.pose(camera, sensor, 0.0);
-        }
-        let body = self.body_frame.as_deref().or(messages.body_frame.as_deref()).unwrap_or(sensor);
-        let body_from_sensor = messages.transforms.pose(body, sensor, 0.0)?;
-        Ok(body_from_camera.map_or(body_from_sensor, |camera| camera.inverse().compose(&body_from_sensor)))
-    }
-
-    /// Returns the position of the satellite receiver's antenna in the frame of the camera; `None` without a receiver.
-    fn antenna(
         &self,
         file: &Path,
         messages: &RecordedMessages,
         body_from_camera: Option<Se3>,
-    ) -> Result<Option<Vector3<f64>>, McapError> {
-        let Some(settings) = &self.fixes else { return Ok(None) };
+        sensor: &str,
+    ) -> Result<Se3, Box<str>> {
+        let pose = |frame: &str| {
+            messages.transforms.pose(frame, sensor, 0.0).map_err(|fault| fault.to_string().into())
+        };
+        let camera = self.camera_frame.as_deref().or(messages.camera_frame.as_deref());
+        if let (None, Some(camera)) = (self.body_from_camera, camera) {
+            return pose(camera);
+        }
+        let body_from_sensor = pose(self.body_frame(file, messages).map_err(|fault| fault.to_string())?)?;
+        Ok(body_from_camera.map_or(body_from_sensor, |camera| camera.inverse().compose(&body_from_sensor)))
+    }
+
+    /// Returns the position of the satellite receiver's antenna in the frame of the camera; zero if there is no position by
+    /// satellites.
+    fn antenna(
+        &self,
+        file: &Path,
+        messages: &RecordedMessages,
+        settings: &McapFixes,
+        body_from_camera: Option<Se3>,
+    ) -> Result<Vector3<f64>, McapError> {
         let frame = match (&settings.antenna, &messages.antenna_frame) {
-            // `georeference` reports that there is no position
-            (None, None) => return Ok(Some(Vector3::zeros())),
-            (None, Some(frame)) if self.body_from_camera.is_none() => frame,
-            (given, frame) => {
-                let body = self.body_frame(file, messages)?;
-                given.map_or(frame.as_deref().unwrap_or(body), |_| body)
-            }
+            (Some(_), _) => self.body_frame(file, messages)?,
+            (None, Some(frame)) => frame,
+            (None, None) => return Ok(Vector3::zeros()),
         };
-        let place = self.camera_from_sensor(messages, body_from_camera, frame);
-        let no_place = |fault: TransformError| McapError::NoAntenna {
-            file: file.to_owned(),
-            fault: fault.to_string().into(),
-        };
-        let origin = settings.antenna.map_or(Vector3::zeros(), |antenna| antenna.vector());
-        Ok(Some(place.map_err(no_place)?.act(&origin)))
+        let place = self.camera_from_sensor(file, messages, body_from_camera, frame);
+        let place = place.map_err(|fault| McapError::NoAntenna { file: file.to_owned(), fault })?;
+        Ok(place.act(&settings.antenna.map_or(Vector3::zeros(), |antenna| antenna.vector())))
     }
 
     /// Returns the times of the images and their boxes, and boxes that cannot be used.

@@ -172,7 +172,7 @@ pub(super) fn georeference(
         Ok((fix.frame.0, PoseFactor { id: None, keys, factor: Arc::new(factor), noise, loss }))
     };
     let factors = used.into_iter().map(factor).collect::<Result<_, String>>()?;
-    Ok((Georeference { origin, enu_from_odometry, up: odometry.up }, factors))
+    Ok((Georeference { origin, enu_from_odometry, is_level: odometry.up.is_some() }, factors))
 }
 
 impl FixedOdometry<'_> {
@@ -210,28 +210,30 @@ impl FixedOdometry<'_> {
         const FAR: f64 = 4.0;
         let mut near: Vec<&UsedFix> = used.iter().collect();
         for _ in 1..ALIGNMENTS {
-            let Some(pose) = Pairs::new(&near, self.up).and_then(|pairs| pairs.align(self.up)) else { break };
+            let Some(pose) = PositionPairs::new(&near, self.up).and_then(|pairs| pairs.align(self.up)) else {
+                break;
+            };
             let distance = |fix: &UsedFix| (pose.act(&fix.by_odometry) - fix.east_north_up).norm();
             let mut distances: Vec<f64> = used.iter().map(distance).collect();
             distances.sort_by(f64::total_cmp);
             let most = (FAR * distances[distances.len() / 2]).max(f64::MIN_POSITIVE);
             near = used.iter().filter(|fix| distance(fix) <= most).collect();
         }
-        let pairs = Pairs::new(&near, self.up).ok_or("none of them can be used")?;
+        let pairs = PositionPairs::new(&near, self.up).ok_or("none of them can be used")?;
         pairs.check(self.up)?;
         pairs.align(self.up).ok_or_else(|| "they do not determine a rotation".into())
     }
 }
 
 /// Positions by odometry and by satellites, without their means. If up is known, only their horizontal parts.
-struct Pairs {
+struct PositionPairs {
     means: [Vector3<f64>; 2],
     pairs: Vec<(Vector3<f64>, Vector3<f64>)>,
     /// Root mean square of the standard deviations. Unit: metres.
     sigma: f64,
 }
 
-impl Pairs {
+impl PositionPairs {
     /// Returns `None` without a position.
     fn new(fixes: &[&UsedFix], up: Option<Direction>) -> Option<Self> {
         if fixes.is_empty() {
