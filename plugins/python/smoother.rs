@@ -18,20 +18,9 @@ use pyo3::types::PyDict;
 use std::sync::Arc;
 
 /// The id of a factor in a smoother.
-#[pyclass(module = "manifactor", frozen)]
-#[derive(Clone, Copy)]
-pub(crate) struct FactorId {
-    number: u32,
-    /// The id in the core; `None` after unpickling, because only a smoother makes ids.
-    inner: Option<InnerId>,
-}
-
-impl FactorId {
-    fn of(id: InnerId) -> PyResult<Self> {
-        let number = id.to_string().parse().map_err(errors::internal)?;
-        Ok(Self { number, inner: Some(id) })
-    }
-}
+#[pyclass(module = "manifactor", frozen, eq, hash)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct FactorId(InnerId);
 
 #[pymethods]
 impl FactorId {
@@ -43,26 +32,18 @@ impl FactorId {
         *self
     }
 
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| other.get().number == self.number)
-    }
-
-    fn __hash__(&self) -> isize {
-        self.number as isize
-    }
-
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (u32,))> {
-        Ok((slf.get_type().getattr("_unpickle")?, (slf.get().number,)))
+        Ok((slf.get_type().getattr("_unpickle")?, (slf.get().0.number(),)))
     }
 
     #[staticmethod]
     #[pyo3(name = "_unpickle")]
     fn unpickle(number: u32) -> Self {
-        Self { number, inner: None }
+        Self(InnerId::of_number(number))
     }
 
     fn __repr__(&self) -> String {
-        format!("FactorId({})", self.number)
+        format!("FactorId({})", self.0)
     }
 }
 
@@ -72,24 +53,6 @@ impl FactorId {
 pub(crate) struct Smoother {
     inner: Inner,
     functions: Functions,
-}
-
-impl Smoother {
-    /// Returns ids of the core.
-    fn ids(&self, factors: &[Py<FactorId>]) -> PyResult<Vec<InnerId>> {
-        let known = match factors.iter().all(|id| id.get().inner.is_some()) {
-            true => vec![],
-            false => self.inner.graph().1.into_iter().map(FactorId::of).collect::<PyResult<_>>()?,
-        };
-        let id = |id: &Py<FactorId>| {
-            let id = *id.get();
-            let same = || known.iter().find(|known| known.number == id.number)?.inner;
-            id.inner.or_else(same).ok_or_else(|| {
-                errors::graph(format_args!("there is no factor {} in this smoother", id.number))
-            })
-        };
-        factors.iter().map(id).collect()
-    }
 }
 
 #[pymethods]
@@ -126,12 +89,12 @@ impl Smoother {
             functions.add(&graph, &ids);
             Ok(ids)
         })?;
-        ids.map_err(|error: String| errors::graph(error))?.into_iter().map(FactorId::of).collect()
+        Ok(ids.map_err(|error: String| errors::graph(error))?.into_iter().map(FactorId).collect())
     }
 
     /// Removes factors at the next update.
     fn remove(&mut self, factors: Vec<Py<FactorId>>) -> PyResult<()> {
-        let ids = self.ids(&factors)?;
+        let ids: Vec<InnerId> = factors.iter().map(|id| id.get().0).collect();
         self.inner.remove(&ids).map_err(errors::graph)
     }
 

@@ -207,11 +207,10 @@ def online(
     """
     path, text = opened(config, "run")
     lines = None if frames is None else (frame if isinstance(frame, str) else json.dumps(frame, default=part_of_frame) for frame in frames)
-    told, rejected, first = _native.online(path, text, overrides(set), data_folder(data), lines, on_frame)
+    results, rejected, first = _native.online(path, text, overrides(set), data_folder(data), lines, on_frame)
     if rejected and on_frame is None:
-        frames_were = "frame was" if rejected == 1 else "frames were"
-        warnings.warn(f"{rejected} {frames_were} rejected, the first: {first}", stacklevel=2)
-    report, table, record, page = told
+        warnings.warn(f"frames that were rejected: {rejected}, the first: {first}", stacklevel=2)
+    report, table, record, page = results
     return Report(json.loads(report), json.loads(table), json.loads(record), page)
 
 

@@ -192,7 +192,7 @@ def test_numbers_of_numpy_change_a_document() -> None:
 
 def test_rejected_frames_are_a_warning() -> None:
     frames = list(frames_of_a_ball())
-    with pytest.warns(UserWarning, match="2 frames were rejected, the first: .*line 4"):
+    with pytest.warns(UserWarning, match="frames that were rejected: 2, the first: .*line 4"):
         mf.online(LIVE, [*frames[:3], {"pose": None}, "{", *frames[3:]])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
