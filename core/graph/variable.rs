@@ -78,6 +78,8 @@ pub trait ErasedManifold {
     fn local(&self, other: &dyn Variable) -> Option<Vec<f64>>;
     /// See [`Manifold::coordinate`].
     fn coordinate(&self, direction: usize) -> Option<f64>;
+    /// See [`Manifold::position`].
+    fn position(&self) -> Option<[f64; 3]>;
     /// Returns whether every coordinate is finite.
     fn is_finite(&self) -> bool;
     /// Returns a copy of the point.
@@ -109,6 +111,9 @@ impl<M: Manifold + Variable> ErasedManifold for M {
     }
     fn coordinate(&self, direction: usize) -> Option<f64> {
         Manifold::coordinate(self, direction)
+    }
+    fn position(&self) -> Option<[f64; 3]> {
+        Manifold::position(self)
     }
     fn is_finite(&self) -> bool {
         Manifold::is_finite(self)

@@ -1,6 +1,5 @@
 //! A graph for display: its connections, and the cost of each factor before and after a solve.
 mod dot;
-mod svg;
 
 use crate::failure::Failure;
 use crate::output::text::Table;
@@ -136,11 +135,6 @@ impl Inspection {
     /// The graph as Graphviz.
     pub(crate) fn dot(&self) -> String {
         dot::write(self)
-    }
-
-    /// The graph as a picture, seen from above.
-    pub(crate) fn svg(&self) -> String {
-        svg::write(self)
     }
 }
 

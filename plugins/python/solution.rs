@@ -11,6 +11,7 @@ use manifactor::graph::{Graph as InnerGraph, Key, Values as InnerValues};
 use manifactor::solve::{
     Auto, GivenStart, IterationRecord, Observer, Optimizer, Solution as Inner, Start, solve as solve_inner,
 };
+use manifactor::viz::graph_page;
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -77,6 +78,8 @@ pub(crate) struct Solution {
     /// The graph as it was solved; later changes of the program's graph do not affect it.
     graph: Arc<InnerGraph>,
     values: Arc<InnerValues>,
+    /// The values from which the solver started.
+    start: Arc<InnerValues>,
     /// Report of the solver. In an unpickled solution, the report in `inner` is different.
     account: Account,
 }
@@ -106,13 +109,14 @@ fn solve(
     let (graph, values) = (graph.try_borrow()?.0.snapshot(), values.try_borrow()?.0.snapshot());
     let solved = detach(py, || {
         let values = start.initial_values(&graph, &values).map_err(|error| error.to_string())?;
-        solve_inner(&graph, &values, &*solver, &mut watch).map_err(|error| error.to_string())
+        let inner = solve_inner(&graph, &values, &*solver, &mut watch).map_err(|error| error.to_string())?;
+        Ok::<_, String>((values, inner))
     })?;
     watch.finish()?;
-    let inner = solved.map_err(errors::graph)?;
-    let values = Arc::new(inner.values.clone());
+    let (start, inner) = solved.map_err(errors::graph)?;
+    let (start, values) = (Arc::new(start), Arc::new(inner.values.clone()));
     let account = Account::new(&inner.outcome)?;
-    Ok(Solution { inner, graph, values, account })
+    Ok(Solution { inner, graph, values, start, account })
 }
 
 #[pymethods]
@@ -127,6 +131,21 @@ impl Solution {
     #[getter]
     fn graph(&self) -> Graph {
         Graph(Shared::of("solution", self.graph.clone()))
+    }
+
+    /// The values from which the solver started.
+    #[getter]
+    fn initial_values(&self) -> Values {
+        Values(Shared::of("solution", self.start.clone()))
+    }
+
+    /// Returns a page with the graph in 3D, before and after the solve, its costs by type of factor, and the factors with
+    /// the largest costs. A notebook shows it; `save_html` of the page writes it to a file.
+    #[pyo3(signature = (title = "graph"))]
+    fn plot<'py>(&self, py: Python<'py>, title: &str) -> PyResult<Bound<'py, PyAny>> {
+        let summary = self.account.summary();
+        let html = detach(py, || graph_page(title, &self.graph, &self.start, &self.inner, &summary))?;
+        py.import("manifactor.report")?.getattr("Page")?.call1((html,))
     }
 
     /// True if the values are a minimum within the tolerances.
@@ -259,7 +278,8 @@ impl Solution {
         let (own, py) = (slf.get(), slf.py());
         let states: Vec<State> = own.inner.factors.iter().cloned().map(Into::into).collect();
         let account = own.account.clone();
-        let content = (own.graph(), own.values(), account, states, own.inner.weights.clone());
+        let values = (own.values(), own.initial_values());
+        let content = (own.graph(), values, account, states, own.inner.weights.clone());
         Ok((slf.get_type().getattr("_unpickle")?, content.into_pyobject(py)?))
     }
 
@@ -268,19 +288,20 @@ impl Solution {
     fn unpickle(
         py: Python<'_>,
         graph: PyRef<'_, Graph>,
-        values: PyRef<'_, Values>,
+        values: (PyRef<'_, Values>, PyRef<'_, Values>),
         account: Account,
         states: Vec<State>,
         weights: Vec<f64>,
     ) -> PyResult<Self> {
-        let (mut graph, values) = (graph.0.snapshot(), values.0.snapshot());
+        let (values, start) = values;
+        let (mut graph, values, start) = (graph.0.snapshot(), values.0.snapshot(), start.0.snapshot());
         let inner = detach(py, || restored(&graph, &values, states, weights))?.map_err(errors::graph)?;
         if !inner.weights.is_empty() {
             // the problem of `inner` lacks the weights; a graph of another version makes it compile again
             // with them
             Arc::make_mut(&mut graph).factors_mut();
         }
-        Ok(Self { inner, graph, values, account })
+        Ok(Self { inner, graph, values, start, account })
     }
 
     fn _repr_html_(&self) -> String {

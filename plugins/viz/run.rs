@@ -33,7 +33,7 @@ pub(crate) fn maps_and_charts(
         pose::positions(variant, width),
         pose::angles(variant, width),
         residual::residuals(variant, width),
-        cost(std::slice::from_ref(variant), width),
+        cost(&costs(std::slice::from_ref(variant)), width),
     ];
     maps.into_iter().chain(charts).flatten().collect()
 }
@@ -46,16 +46,21 @@ pub(crate) fn images(variant: &VariantRecord, palette: &Palette, width: f64) -> 
         .collect()
 }
 
-/// Draws the cost by iteration, with a curve for each variant. Several variants may have different factors, so
+/// Returns the costs of variants, with their names.
+pub(crate) fn costs(variants: &[VariantRecord]) -> Vec<(&str, &[f64])> {
+    variants.iter().map(|variant| (variant.name.as_str(), &variant.cost[..])).collect()
+}
+
+/// Draws the cost by accepted step, with a curve for each name. Several solves may have different factors, so
 /// their costs are shares of the initial cost.
-pub(crate) fn cost(variants: &[VariantRecord], width: f64) -> Option<Picture> {
-    let is_shared = variants.len() > 1;
-    let curve = |(i, variant): (usize, &VariantRecord)| {
-        let unit = variant.cost.first().copied().filter(|cost| is_shared && *cost > 0.0).unwrap_or(1.0);
-        let points = variant.cost.iter().enumerate().map(|(step, cost)| (step as f64, cost / unit)).collect();
-        Curve::new(&variant.name, Ink::Series(i), points).with_dots()
+pub(crate) fn cost(solves: &[(&str, &[f64])], width: f64) -> Option<Picture> {
+    let is_shared = solves.len() > 1;
+    let curve = |(i, (name, costs)): (usize, &(&str, &[f64]))| {
+        let unit = costs.first().copied().filter(|cost| is_shared && *cost > 0.0).unwrap_or(1.0);
+        let points = costs.iter().enumerate().map(|(step, cost)| (step as f64, cost / unit)).collect();
+        Curve::new(name, Ink::Series(i), points).with_dots()
     };
-    let curves: Vec<Curve> = variants.iter().enumerate().map(curve).collect();
+    let curves: Vec<Curve> = solves.iter().enumerate().map(curve).collect();
     let costs = || curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
     let log_y = costs().fold(0.0, f64::max) > 10.0 * costs().fold(f64::INFINITY, f64::min);
     let y = if is_shared { "cost / initial cost" } else { "cost, ½ Σ ρ" };

@@ -42,6 +42,12 @@ pub trait Manifold: Clone + Debug + Send + Sync + 'static {
         None
     }
 
+    /// Returns the place in space where pictures of a graph show the point, in the frame of the graph and in the
+    /// unit of its lengths. `None` if it has none, such as a rotation. Default: `None`.
+    fn position(&self) -> Option<[f64; 3]> {
+        None
+    }
+
     /// Returns whether every coordinate is finite.
     fn is_finite(&self) -> bool;
 }

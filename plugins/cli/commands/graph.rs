@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 /// Show the factors of a graph by key, with residual, cost and weight, before and after a solve.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("form").args(["dot", "json", "svg"]))]
+#[command(group = ArgGroup::new("form").args(["dot", "json"]))]
 #[command(
     after_help = "Example:\n  manifactor graph examples/03_relations/graph.toml --solve --sort cost --top 5"
 )]
@@ -29,10 +29,10 @@ pub(crate) struct ShowGraph {
     #[command(flatten)]
     reading: Reading,
     /// Order of the factors. Default: the order in the graph.
-    #[arg(long, value_enum, conflicts_with_all = ["dot", "svg"])]
+    #[arg(long, value_enum, conflicts_with = "dot")]
     sort: Option<Order>,
     /// List only the first N factors.
-    #[arg(long, value_name = "N", conflicts_with_all = ["dot", "svg"])]
+    #[arg(long, value_name = "N", conflicts_with = "dot")]
     top: Option<usize>,
     /// Print a Graphviz file.
     #[arg(long)]
@@ -40,9 +40,6 @@ pub(crate) struct ShowGraph {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Print an SVG picture, seen from above.
-    #[arg(long)]
-    svg: bool,
 }
 
 /// An order of factors.
@@ -80,8 +77,6 @@ impl ShowGraph {
             output::print_json(&inspection);
         } else if self.dot {
             output::print(&inspection.dot());
-        } else if self.svg {
-            output::print(&inspection.svg());
         } else {
             output::print(&inspection.table());
         }

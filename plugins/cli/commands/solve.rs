@@ -10,15 +10,19 @@ use crate::output::watch::Watch;
 use crate::output::{self, report};
 use crate::status::Status;
 use clap::Args;
+use manifactor::formats::whole::write_whole;
 use manifactor::geometry::certify;
 use manifactor::solve::{AllObservers, Solution, solve};
+use manifactor::viz::{SolveSummary, graph_page};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
 
 /// Solve a graph: a literal graph (.toml, .json, .yaml), a pose graph (.g2o, TORO) or bundle adjustment (.bal).
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  manifactor solve examples/03_relations/graph.toml --covariances")]
+#[command(
+    after_help = "Examples:\n  manifactor solve examples/03_relations/graph.toml --covariances\n  manifactor solve examples/python/helix.g2o --report out/helix.html"
+)]
 pub(crate) struct Solve {
     /// The graph.
     graph: PathBuf,
@@ -37,6 +41,9 @@ pub(crate) struct Solve {
     covariances: Option<Vec<String>>,
     #[command(flatten)]
     destination: Destination,
+    /// Write a page with the graph in 3D, before and after the solve, and the factors with the largest costs.
+    #[arg(long, value_name = "FILE", group = "written")]
+    report: Option<PathBuf>,
     /// Print JSON: costs, iterations, termination, seconds by stage and the estimate; with -v a record for each step.
     #[arg(long)]
     pub(crate) json: bool,
@@ -45,6 +52,9 @@ pub(crate) struct Solve {
 impl Solve {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
         self.destination.check(&self.graph)?;
+        if let Some(page) = &self.report {
+            self.destination.check_other(page, &self.graph)?;
+        }
         let mut input = self.reading.open(&self.graph, &self.solver)?;
         input.notes.extend(self.what_if.apply(&mut input.graph, &input.values)?);
         for note in &input.notes {
@@ -60,6 +70,12 @@ impl Solve {
         let solution = solution.map_err(Failure::input)?;
         drop(watch);
         self.destination.write(&input.graph, &solution.values)?;
+        if let Some(page) = &self.report {
+            let title = graph_file::title(&self.graph);
+            let summary = SolveSummary::new(&solution.outcome);
+            let html = graph_page(&title, &input.graph, &values, &solution, &summary);
+            write_whole(page, html.as_bytes()).map_err(Failure::at(page))?;
+        }
         let certificate = self.certify.then(|| certify(&input.graph, &solution.values));
         let certificate = certificate.transpose().map_err(Failure::input)?;
         let diagnosis = solution.diagnose(&input.graph).map_err(Failure::input)?;

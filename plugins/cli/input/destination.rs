@@ -1,21 +1,22 @@
 //! The output file of a graph, and protection against overwriting.
 use crate::failure::Failure;
 use crate::output;
-use clap::Args;
+use clap::{ArgGroup, Args};
 use manifactor::config::{Format, write_graph};
 use manifactor::formats::whole::{check_writable, write_whole};
 use manifactor::formats::{GraphFormat, GraphWriter};
 use manifactor::graph::{Graph, Values};
 use std::path::{Path, PathBuf};
 
-/// `--out` and `--force`.
+/// `--out` and `--force`. Further files that `--force` may overwrite are in the group `written`.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("written").multiple(true))]
 pub(crate) struct Destination {
     /// Write the graph with the estimate to this file; the extension selects the format.
-    #[arg(long, short, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE", group = "written")]
     out: Option<PathBuf>,
     /// Overwrite an existing file.
-    #[arg(long, requires = "out")]
+    #[arg(long, requires = "written")]
     force: bool,
 }
 
@@ -28,6 +29,14 @@ impl Destination {
         }
         if !self.force {
             refuse_to_replace(path, input, "is the input graph, and its comments would be lost")?;
+        }
+        check_writable(path).map_err(Failure::at(path))
+    }
+
+    /// Returns an error if a further file cannot be written. Called before the solve.
+    pub(crate) fn check_other(&self, path: &Path, input: &Path) -> Result<(), Failure> {
+        if !self.force {
+            refuse_to_replace(path, input, "is the input graph")?;
         }
         check_writable(path).map_err(Failure::at(path))
     }

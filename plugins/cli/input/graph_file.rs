@@ -3,7 +3,7 @@ use crate::failure::Failure;
 use crate::input::document::Content;
 use crate::input::kind;
 use crate::input::solver::SolverArguments;
-use crate::output::text::count;
+use crate::output::text::{count, on_one_line};
 use clap::{Args, ValueEnum};
 use manifactor::config::{Definitions, Document, Errors, Format, graph_root, read_graph_section};
 use manifactor::formats::{self, GraphFormat, GraphRead, InformationRepair};
@@ -148,6 +148,12 @@ fn check_memory(path: &Path) -> Result<(), Failure> {
         ),
         "raise the limit (ulimit -v), use fewer threads, or solve the graph in parts",
     ))
+}
+
+/// The title of pictures and pages: the name of the file.
+pub(crate) fn title(path: &Path) -> String {
+    let name = if path == Path::new(formats::STDIN) { None } else { path.file_name() };
+    name.map_or_else(|| "graph".to_owned(), |name| on_one_line(&name.to_string_lossy()).into_owned())
 }
 
 /// A summary of a graph, in a few lines.

@@ -121,6 +121,9 @@ impl Manifold for BalCamera {
             _ => None,
         }
     }
+    fn position(&self) -> Option<[f64; 3]> {
+        Some(self.world_from_camera.translation.into())
+    }
     fn is_finite(&self) -> bool {
         let numbers = [self.focal_length, self.distortion.x, self.distortion.y];
         self.world_from_camera.is_finite() && numbers.iter().all(|x| x.is_finite())

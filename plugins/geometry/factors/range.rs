@@ -38,7 +38,7 @@ impl<A: Located, B: Located<Space = A::Space>> Range<A, B> {
         Self { range, between: PhantomData }
     }
     fn squared_distance<T: Scalar>(x: &A::Of<T>, y: &B::Of<T>) -> T {
-        let (from, to) = (A::position(x), B::position(y));
+        let (from, to) = (<A as Located>::position(x), <B as Located>::position(y));
         from.as_ref().iter().zip(to.as_ref()).fold(T::zero(), |sum, (a, b)| sum + (*b - *a) * (*b - *a))
     }
 }

@@ -104,6 +104,13 @@ impl<const N: usize> Manifold for Rn<N> {
     fn coordinate(&self, direction: usize) -> Option<f64> {
         self.0.get(direction).copied()
     }
+    fn position(&self) -> Option<[f64; 3]> {
+        match *self.0.as_slice() {
+            [x, y] => Some([x, y, 0.0]),
+            [x, y, z] => Some([x, y, z]),
+            _ => None,
+        }
+    }
     fn is_finite(&self) -> bool {
         self.0.iter().all(|x| x.is_finite())
     }

@@ -160,6 +160,9 @@ impl Manifold for Se2 {
     fn local(&self, other: &Self) -> Vector3<f64> {
         self.between(other).log()
     }
+    fn position(&self) -> Option<[f64; 3]> {
+        Some([self.translation.x, self.translation.y, 0.0])
+    }
     fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.translation.iter().all(|x| x.is_finite())
     }

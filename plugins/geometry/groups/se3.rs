@@ -163,6 +163,9 @@ impl Manifold for Se3 {
     fn local(&self, other: &Self) -> Vector6<f64> {
         self.between(other).log()
     }
+    fn position(&self) -> Option<[f64; 3]> {
+        Some(self.translation.into())
+    }
     fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.translation.iter().all(|x| x.is_finite())
     }

@@ -200,6 +200,9 @@ impl Manifold for Sim3 {
     fn local(&self, other: &Self) -> Vector7<f64> {
         self.between(other).log()
     }
+    fn position(&self) -> Option<[f64; 3]> {
+        Some(self.translation.into())
+    }
     fn is_finite(&self) -> bool {
         self.pose().is_finite() && self.scale.is_finite() && self.scale > 0.0
     }

@@ -31,7 +31,7 @@ from .groups import Group
 from .frames import poses, rotations, to_pandas
 from .logs import enable_logging
 from .losses import *
-from .report import Report, Summary, experiment, online, run, written
+from .report import Page, Report, Summary, experiment, online, run, written
 from .solvers import auto, dogleg, gauss_newton, gnc, levenberg_marquardt
 from .traced import Check, TracedFactor, check_factor, factor
 from .variables import *
@@ -54,6 +54,7 @@ __all__ = [
     "Loss",
     "ManifactorError",
     "Noise",
+    "Page",
     "Report",
     "Session",
     "Smoother",

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .chosen import Factor, Loss, Solver, Start, Variable
+from .report import Page
 from .rerun import Live
 
 __version__: str
@@ -268,6 +269,12 @@ class Solution:
     def graph(self) -> Graph:
         """The graph that was solved, without later changes. It is immutable; `copy.copy` returns a mutable
         copy."""
+    @property
+    def initial_values(self) -> Values:
+        """The values from which the solver started. They are immutable; `copy.copy` returns a mutable copy."""
+    def plot(self, title: str = "graph") -> Page:
+        """Returns a page with the graph in 3D, before and after the solve, its costs by type of factor, and the
+        factors with the largest costs. A notebook shows it; `save_html` of the page writes it to a file."""
     @property
     def converged(self) -> bool:
         """True if the values are a minimum within the tolerances."""

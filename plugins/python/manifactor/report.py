@@ -22,6 +22,24 @@ Config = str | os.PathLike[str] | Mapping[str, Any]
 Array = NDArray[np.float64]
 
 
+class Page:
+    """A page for a browser, which needs no network."""
+
+    def __init__(self, html: str) -> None:
+        #: The page.
+        self.html = html
+
+    def __repr__(self) -> str:
+        return f"Page({len(self.html)} characters)"
+
+    def _repr_html_(self) -> str:
+        return f'<iframe srcdoc="{html.escape(self.html)}" style="width: 100%; height: 720px; border: 0"></iframe>'
+
+    def save_html(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
+        """Writes the page. An existing file is replaced only with `force`."""
+        written(path, self.html, force)
+
+
 class Trajectory:
     """Poses by time: from the camera's frame (z forward) to the frame of the truth, or of the map if there
     is no truth."""
@@ -71,8 +89,8 @@ class Variant:
         return list(self.report["objects"])
 
 
-class Report:
-    """Result of a run."""
+class Report(Page):
+    """Result of a run, and its page with the map in 3D."""
 
     def __init__(
         self, report: dict[str, Any], table: list[dict[str, Any]], record: dict[str, Any], page: str
@@ -81,8 +99,7 @@ class Report:
         self.complete: bool = report["complete"]
         self.seconds: float = report["seconds"]
         self.variants = [Variant(*of) for of in zip(report["variants"], table, record["variants"], strict=True)]
-        #: The page with the map in 3D, as HTML that needs no network.
-        self.html = page
+        super().__init__(page)
 
     def __iter__(self) -> Iterator[Variant]:
         return iter(self.variants)
@@ -100,13 +117,6 @@ class Report:
 
     def __repr__(self) -> str:
         return f"Report({self.title!r}, {len(self)} variants, {self.seconds:.2f} s)"
-
-    def _repr_html_(self) -> str:
-        return f'<iframe srcdoc="{html.escape(self.html)}" style="width: 100%; height: 720px; border: 0"></iframe>'
-
-    def save_html(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
-        """Writes the page. An existing file is replaced only with `force`."""
-        written(path, self.html, force)
 
     def to_pandas(self) -> Any:
         """Returns the table of the run as a `pandas.DataFrame`, with one row per variant."""

@@ -3,6 +3,7 @@ use crate::errors;
 use manifactor::graph::batch::FactorState;
 use manifactor::graph::{Graph, Values};
 use manifactor::solve::{LevenbergMarquardt, Outcome, Silent, Solution, Stopping, solve};
+use manifactor::viz::SolveSummary;
 use pyo3::prelude::*;
 use serde_json::Value as Json;
 
@@ -15,6 +16,10 @@ pub(super) struct Account {
     pub initial_cost: f64,
     pub final_cost: f64,
     pub iterations: usize,
+    /// The report in words, and the costs of the steps.
+    pub verdict: String,
+    pub warnings: Vec<String>,
+    pub costs: Vec<f64>,
     /// The whole report, and the seconds by stage, as JSON.
     pub outcome: String,
     pub times: String,
@@ -23,7 +28,11 @@ pub(super) struct Account {
 impl Account {
     pub(super) fn new(outcome: &Outcome) -> PyResult<Self> {
         let json = |value: Result<String, serde_json::Error>| value.map_err(errors::internal);
+        let SolveSummary { verdict, warnings, costs } = SolveSummary::new(outcome);
         Ok(Self {
+            verdict,
+            warnings,
+            costs,
             converged: outcome.termination.is_converged(),
             termination: outcome.termination.to_string(),
             initial_cost: outcome.initial_cost,
@@ -32,6 +41,12 @@ impl Account {
             outcome: json(serde_json::to_string(outcome))?,
             times: json(serde_json::to_string(&outcome.times))?,
         })
+    }
+
+    /// Returns the report in words.
+    pub(super) fn summary(&self) -> SolveSummary {
+        let Self { verdict, warnings, costs, .. } = self.clone();
+        SolveSummary { verdict, warnings, costs }
     }
 }
 

@@ -168,6 +168,9 @@ impl Manifold for DualQuadric {
         let ratio = other.semi_axes.component_div(&self.semi_axes);
         SVector::from_fn(|i, _| if i < 6 { xi[i] } else { ratio[i - 6].ln() })
     }
+    fn position(&self) -> Option<[f64; 3]> {
+        Some(self.pose.translation.into())
+    }
     fn is_finite(&self) -> bool {
         self.pose.is_finite() && self.semi_axes.iter().all(|s| s.is_finite())
     }

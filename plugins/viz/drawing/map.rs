@@ -1,21 +1,19 @@
 //! The map, from above or from the side.
 use super::axes::{Axes, HEAD, title};
+use super::extent::{Extent, Plot};
 use super::labels::{Label, place};
 use super::legend::{Entry, legend};
 use super::outline::Shape;
 use super::picture::Picture;
-use super::scale::{FAR, Scale};
+use super::scale::FAR;
 use super::scene::{Object, Palette, Scene, Track};
 use super::series::{spaced, stretches};
 use super::viewpoint::Viewpoint;
 use crate::canvas::{Ink, Sheet, Stroke};
-use nalgebra::{Point2, Vector2, Vector3};
+use nalgebra::{Point2, Vector3};
 
 /// Number of classes in the legend.
 const CLASSES: usize = 60;
-/// Smallest and largest height of the area, as a fraction of the width.
-const SHARES: [f64; 2] = [0.3, 0.9];
-
 /// A class, and the outline of one of its objects.
 type Outline<'a> = (&'a str, Vec<Point2<f64>>);
 
@@ -37,7 +35,7 @@ pub(crate) fn map(scene: &Scene, view: Viewpoint, palette: &Palette, width: f64)
     let mut extent = Extent::default();
     tracks.iter().flatten().flatten().for_each(|p| extent.include(p));
     truths.iter().flat_map(|(_, outline)| outline).for_each(|p| extent.include(p));
-    let (near, outside) = extent.include_near(&estimates);
+    let (near, outside) = extent.include_near(&estimates, |(_, outline)| outline);
 
     let entries = legend(&entries(scene, palette, &truths, &estimates), width - 20.0);
     let top = HEAD + entries.height + 8.0;
@@ -114,73 +112,6 @@ fn around(points: &[[f64; 2]]) -> [f64; 4] {
         end(|p| p[0], f64::max, f64::NEG_INFINITY),
         end(|p| p[1], f64::max, f64::NEG_INFINITY),
     ]
-}
-
-/// The part of the plane that is shown.
-#[derive(Debug, Default)]
-struct Extent(Option<(Point2<f64>, Point2<f64>)>);
-
-impl Extent {
-    fn include(&mut self, p: &Point2<f64>) {
-        let (low, high) = self.0.unwrap_or((*p, *p));
-        self.0 = Some((low.inf(p), high.sup(p)));
-    }
-
-    /// Returns how far a point lies outside along x or y.
-    fn beyond(&self, p: &Point2<f64>) -> f64 {
-        self.0.map_or(0.0, |(low, high)| (low - p).sup(&(p - high)).max().max(0.0))
-    }
-
-    /// Includes the outlines within a margin around the extent, and returns them with the number of
-    /// outlines outside. The margin is half the extent's size, or three times the distance of the median
-    /// outline if that is larger. Most objects are far outside if the camera hardly moved.
-    fn include_near<'a>(&mut self, outlines: &'a [Outline<'a>]) -> (Vec<&'a Outline<'a>>, usize) {
-        let beyond = |o: &Outline<'_>| o.1.iter().map(|p| self.beyond(p)).fold(0.0, f64::max);
-        let distances: Vec<f64> = outlines.iter().map(beyond).collect();
-        let mut sorted = distances.clone();
-        sorted.sort_by(f64::total_cmp);
-        let median = sorted.get(sorted.len().saturating_sub(1) / 2).copied().unwrap_or(0.0);
-        let margin = (0.5 * self.size()).max(3.0 * median);
-        let near = outlines.iter().zip(&distances).filter(|(_, distance)| **distance <= margin);
-        let near: Vec<_> = near.map(|(outline, _)| outline).collect();
-        near.iter().flat_map(|(_, outline)| outline).for_each(|p| self.include(p));
-        let outside = outlines.len() - near.len();
-        (near, outside)
-    }
-
-    /// Returns the longer side.
-    fn size(&self) -> f64 {
-        self.0.map_or(0.0, |(low, high)| (high - low).max())
-    }
-
-    /// Returns its scales on a sheet of this width.
-    fn on(&self, width: f64) -> Plot {
-        let (low, high) = self.0.unwrap_or((Point2::new(-1.0, -1.0), Point2::new(1.0, 1.0)));
-        // for a single point, or points so far out that a relative margin is below rounding
-        let margin = (0.03 * self.size()).max(1e-9 * low.coords.amax().max(high.coords.amax()));
-        let margin = Vector2::repeat(if margin > 0.0 { margin } else { 1.0 });
-        let (middle, mut half) = (nalgebra::center(&low, &high), 0.5 * (high - low) + margin);
-        // the most that numbers and labels need; space that they leave widens the view on both sides
-        let across = width - 100.0;
-        let height = (across * half.y / half.x).clamp(SHARES[0] * width, SHARES[1] * width);
-        let metres = (half.x / across).max(half.y / height);
-        half.y = metres * height;
-        let y = Scale::new(middle.y - half.y, middle.y + half.y);
-        let left = 10.0 + Axes::left(&y, height);
-        half.x = metres * (width - RIGHT - left);
-        let x = Scale::new(middle.x - half.x, middle.x + half.x);
-        Plot { x, y, area: [left, 0.0, width - RIGHT, height] }
-    }
-}
-
-/// Space at the right edge. Unit: pixels.
-const RIGHT: f64 = 18.0;
-
-/// Scales with equal units on both axes, and the area that they need, from 0 downward.
-struct Plot {
-    x: Scale,
-    y: Scale,
-    area: [f64; 4],
 }
 
 #[cfg(test)]

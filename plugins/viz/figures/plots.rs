@@ -2,7 +2,7 @@
 use super::stage::Stage;
 use crate::canvas::{Ink, Sheet, Stroke};
 use crate::drawing::{Chart, Curve, HEAD, Picture, Viewpoint, figure, title};
-use crate::run::cost;
+use crate::run::{self, cost};
 use manifactor_graph::Direction;
 use manifactor_slam::record::VariantRecord;
 use nalgebra::{Point2, Vector3};
@@ -50,7 +50,7 @@ impl Plot {
 /// Draws the costs of variants over accepted steps; the costs of several variants are shares of the initial
 /// cost.
 pub fn costs(variants: &[VariantRecord], width: f64) -> Option<Picture> {
-    cost(variants, width)
+    cost(&run::costs(variants), width)
 }
 
 /// Draws pictures next to each other, the first at the left.

@@ -12,7 +12,8 @@ const SCRIPTS: [&str; 2] = [include_str!("assets/latencies.js"), include_str!("a
 pub fn live_page() -> String {
     let mut page = Page::live("Live map", STYLE);
     let [state, facts] = parts();
-    page.own(state, "").own(viewer::MARKUP, &viewer::SCRIPTS.concat()).own(facts, &SCRIPTS.concat());
+    page.own(state, "").own(viewer::MARKUP, &viewer::VIEW.concat());
+    page.own("", viewer::MAP).own(facts, &SCRIPTS.concat());
     page.paragraph(&version());
     page.html()
 }

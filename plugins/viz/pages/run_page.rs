@@ -3,7 +3,7 @@ use super::page::{PRINT, Page, VALUES};
 use super::run_tables::{held_out, noise, objects, overview, own_variables, words};
 use super::{verdict::verdict, viewer};
 use crate::drawing::{Palette, Picture, Scene, Viewpoint, map};
-use crate::run::{RESIDUALS, cost, images, maps_and_charts, residual_row};
+use crate::run::{RESIDUALS, cost, costs, images, maps_and_charts, residual_row};
 use manifactor_slam::record::{RunRecord, VariantRecord};
 use manifactor_slam::report::{RunReport, VariantReport};
 
@@ -75,13 +75,13 @@ fn in_3d(page: &mut Page, record: &RunRecord, palette: &Palette) {
     );
     page.own("</div>", "");
     page.data("run-data", &viewer::data(record, palette));
-    page.own(viewer::MARKUP, &viewer::SCRIPTS.concat()).own("", &viewer::REPLAY.concat());
+    page.own(viewer::MARKUP, &viewer::VIEW.concat()).own("", viewer::MAP).own("", &viewer::REPLAY.concat());
 }
 
 /// Adds each kind of picture once, with the variants next to each other.
 fn side_by_side(page: &mut Page, record: &RunRecord, palette: &Palette) {
     page.heading("Variants side by side");
-    if let Some(picture) = cost(&record.variants, WIDTH) {
+    if let Some(picture) = cost(&costs(&record.variants), WIDTH) {
         page.pictures([(&picture, CAPTIONS[0].1.to_owned())].into_iter());
     }
     let all: Vec<(&VariantRecord, Vec<Picture>)> = record

@@ -10,15 +10,16 @@ use manifactor_slam::record::{
 use serde_json::{Value, json};
 
 pub(super) const MARKUP: &str = include_str!("assets/map.html");
-/// Scripts of the map, in order of their dependencies. A page adds a script that feeds the map.
-pub(super) const SCRIPTS: [&str; 6] = [
+/// Scripts of every view in 3D, in order of their dependencies. A page adds the script of its content.
+pub(super) const VIEW: [&str; 5] = [
     include_str!("assets/algebra.js"),
     include_str!("assets/shapes.js"),
     include_str!("assets/renderer.js"),
     include_str!("assets/orbit.js"),
     include_str!("assets/panels.js"),
-    include_str!("assets/map.js"),
 ];
+/// Script of the map. A page adds a script that feeds it.
+pub(super) const MAP: &str = include_str!("assets/map.js");
 /// Scripts of a finished run, in order of their dependencies.
 pub(super) const REPLAY: [&str; 2] = [include_str!("assets/cursor.js"), include_str!("assets/replay.js")];
 
@@ -134,7 +135,7 @@ fn pose(pose: &Se3) -> Vec<Value> {
     numbers(pose.translation.iter().chain(&pose.rotation.quaternion_xyzw()), 5)
 }
 
-fn numbers<'a>(list: impl Iterator<Item = &'a f64>, digits: i32) -> Vec<Value> {
+pub(super) fn numbers<'a>(list: impl Iterator<Item = &'a f64>, digits: i32) -> Vec<Value> {
     list.map(|x| number(*x, digits)).collect()
 }
 

@@ -1,4 +1,5 @@
 use crate::{fed, folder, manifactor, path};
+use std::path::Path;
 
 const GRAPH: &str = r#"
 [[variables]]
@@ -57,12 +58,22 @@ fn graphs_are_drawn() {
     let graph = path(&files, "graph.toml");
     let dot = manifactor(&format!("graph {graph} --dot")).ended(0).stdout;
     assert!(dot.starts_with("graph factors {") && dot.contains("\"factor 0\" -- \"x1\""), "{dot}");
-    let svg = manifactor(&format!("graph {graph} --svg")).ended(0).stdout;
+    manifactor(&format!("plot {graph}")).ended(2).complains("the pictures of a graph need --out");
+    let out = path(&files, "pictures");
     assert!(
-        svg.starts_with("<svg") && svg.contains(">x1</text>") && svg.trim_end().ends_with("</svg>"),
-        "{svg}"
+        manifactor(&format!("plot {graph} --out {out}")).ended(0).stdout.contains("2 pictures written to")
     );
-    manifactor(&format!("graph {graph} --svg --dot")).ended(2);
+    let svg = std::fs::read_to_string(format!("{out}/graph.svg")).unwrap();
+    // a small graph has the names of its variables, in a plane there is no view from the side
+    assert!(svg.starts_with("<svg") && svg.contains(">x1</text>"), "{svg}");
+    assert_eq!(std::fs::read(format!("{out}/graph.png")).unwrap().get(1..4), Some(&b"PNG"[..]));
+    assert!(!Path::new(&out).join("graph_side.svg").exists());
+    manifactor("plot nowhere.g2o --out pictures").ended(3).complains("nowhere.g2o");
+    // without names and with both views: 120 poses on a helix
+    let (helix, out) = ("examples/python/helix.g2o", path(&files, "helix"));
+    manifactor(&format!("plot {helix} --out {out} --theme dark")).ended(0);
+    let svg = std::fs::read_to_string(format!("{out}/graph_side.svg")).unwrap();
+    assert!(svg.contains("estimate") && !svg.contains(">1</text>"), "{svg}");
 }
 
 #[test]

@@ -60,6 +60,49 @@ fn the_report_of_a_run_needs_no_network() {
 }
 
 #[test]
+fn the_report_of_a_graph_shows_it_in_3d_and_its_costs() {
+    let folder = folder(&[]);
+    let page = path(&folder, "helix.html");
+    let solve = format!("solve examples/python/helix.g2o --report {page}");
+    manifactor(&solve).ended(0);
+    let html = std::fs::read_to_string(&page).unwrap();
+    assert_self_contained(&html);
+    for text in
+        ["helix.g2o", "Converged", "between_se3", "Factors with the largest costs", "seen from the side"]
+    {
+        assert!(html.contains(text), "{text}");
+    }
+    manifactor(&solve).ended(2).complains("exists already");
+    manifactor(&format!("{solve} --force")).ended(0);
+    manifactor("solve examples/python/helix.g2o --force").ended(2);
+    let Some(mut browser) = Browser::open("") else { return };
+    for (width, scheme) in [(390, "dark"), (1024, "light")] {
+        browser.show(Path::new(&page), width, scheme);
+        browser.until("document.documentElement.dataset.map && canvas.dataset.drawn > 0");
+        assert_eq!(browser.value("document.documentElement.dataset.map"), "webgl");
+        let wide = browser.value("document.documentElement.scrollWidth").as_f64().unwrap();
+        assert!(wide <= f64::from(width), "{wide} of {width} pixels");
+        browser.save_screenshot(&format!("graph_{width}_{scheme}"));
+        browser.was_quiet();
+    }
+    let number = |browser: &mut Browser, expression: &str| browser.value(expression).as_f64().unwrap();
+    // a click on a pose shows its factors
+    browser.value(
+        "const view = window.graphView, box = canvas.getBoundingClientRect(), at = view.project(view.graph.points[0].after);
+         window.picked = { x: box.x + at[0], y: box.y + at[1] }; 0",
+    );
+    let at = [number(&mut browser, "picked.x"), number(&mut browser, "picked.y")];
+    browser.drag(at, [0.0, 0.0]);
+    browser.until("canvas.dataset.selected !== ''");
+    let told = browser.value("document.getElementById('object').textContent");
+    assert!(told.as_str().unwrap().contains("between_se3 ("), "{told}");
+    browser.value("for (const box of document.querySelectorAll('[data-show]')) box.click(); 0");
+    browser.until("!graphView.show.after && graphView.show.before && graphView.show.cost");
+    browser.save_screenshot("graph_before");
+    browser.was_quiet();
+}
+
+#[test]
 fn the_map_turns_zooms_and_tells_of_an_object() {
     let folder = folder(&[]);
     let page = desk(&path(&folder, "desk"));

@@ -58,7 +58,13 @@ fn holds_what_it_may(text: &str) {
 #[test]
 fn pictures_and_pages_hold_what_they_may() {
     let folder = folder(&[("graph.toml", &graph()), ("run.toml", &run_document())]);
-    holds_what_it_may(&manifactor(&format!("graph {} --svg", path(&folder, "graph.toml"))).ended(0).stdout);
+    let (graph, pictures) = (path(&folder, "graph.toml"), path(&folder, "pictures"));
+    let page = path(&folder, "page.html");
+    manifactor(&format!("plot {graph} --out {pictures}")).ended(0);
+    manifactor(&format!("solve {graph} --report {page}")).ended(0);
+    for file in [format!("{pictures}/graph.svg"), page] {
+        holds_what_it_may(&std::fs::read_to_string(file).unwrap());
+    }
     let out = path(&folder, "out");
     manifactor(&format!("run {} --out {out}", path(&folder, "run.toml")));
     for file in ["report.html", "b/map_top.svg"] {
