@@ -1,5 +1,4 @@
 //! Estimation of the noise of a stream from its first seconds, beside the mapping of later frames.
-use manifactor_mapping::estimate::EstimateError;
 use manifactor_mapping::estimate::variance::StreamNoise;
 use manifactor_mapping::settings::RunSettings;
 use manifactor_online::{FrameReport, Mapper};
@@ -39,7 +38,7 @@ enum Stage {
 /// A thread that ends early when its handle is dropped.
 #[derive(Debug)]
 struct Running {
-    thread: Option<JoinHandle<Result<Option<StreamNoise>, EstimateError>>>,
+    thread: Option<JoinHandle<Result<Option<StreamNoise>, String>>>,
     cancelled: Arc<AtomicBool>,
 }
 
@@ -113,13 +112,19 @@ impl Running {
     fn start(frames: Sequence, settings: RunSettings) -> Self {
         let cancelled = Arc::new(AtomicBool::new(false));
         let mut observer = Cancellation(cancelled.clone());
-        let thread = std::thread::spawn(move || StreamNoise::estimate(frames, &settings, &mut observer));
+        // the thread of the stream waits for the estimate, so its pool cannot compute it
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).build();
+        let thread = std::thread::spawn(move || {
+            let pool = pool.map_err(|error| error.to_string())?;
+            let estimate = || StreamNoise::estimate(frames, &settings, &mut observer);
+            pool.install(estimate).map_err(|error| error.to_string())
+        });
         Self { thread: Some(thread), cancelled }
     }
 
     fn join(mut self) -> Result<Option<StreamNoise>, String> {
         match self.thread.take().map(JoinHandle::join) {
-            Some(Ok(found)) => found.map_err(|error| error.to_string()),
+            Some(Ok(found)) => found,
             Some(Err(_)) | None => Err("its estimate panicked".to_owned()),
         }
     }
