@@ -5,7 +5,7 @@
 //! that belong to one true object. Homogeneity and completeness follow Rosenberg and Hirschberg, V-Measure,
 //! 2007. Switches and the identity F1 are measures of multiple object tracking (Bernardin and Stiefelhagen,
 //! 2008; Ristani et al., 2016).
-use super::matching::largest_weight;
+use super::matching::{largest_matching, largest_weight};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -118,6 +118,24 @@ fn best_match<T: Copy + Ord, P: Copy + Ord>(
     usize::try_from(largest_weight(&rows, numbers.len() + columns.len())).unwrap_or(0)
 }
 
+/// Returns the assigned object of each true object, under the one-to-one matching with the largest number of boxes in the
+/// right object. Each box has its true object and its assigned object; true objects without a partner are left out.
+pub fn matched_objects<T: Copy + Ord, P: Copy + Ord>(
+    boxes: impl IntoIterator<Item = (T, P)>,
+) -> BTreeMap<T, P> {
+    let mut shared: BTreeMap<T, BTreeMap<P, i64>> = BTreeMap::new();
+    for (truth, put) in boxes {
+        *shared.entry(truth).or_default().entry(put).or_insert(0) += 1;
+    }
+    let found: BTreeSet<P> = shared.values().flat_map(BTreeMap::keys).copied().collect();
+    let columns: BTreeMap<P, usize> = found.iter().copied().zip(0..).collect();
+    let row = |counts: &BTreeMap<P, i64>| counts.iter().map(|(put, n)| (columns[put], *n)).collect();
+    let rows: Vec<Vec<(usize, i64)>> = shared.values().map(row).collect();
+    let found: Vec<P> = found.into_iter().collect();
+    let partners = largest_matching(&rows, found.len()).into_iter().map(|column| found.get(column?).copied());
+    shared.into_keys().zip(partners).filter_map(|(truth, put)| Some((truth, put?))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -164,5 +182,14 @@ mod tests {
     fn many_objects_need_no_matrix() {
         let boxes = (0..60_000_u32).map(|i| (i % 20_000, Some(20_000 - i % 20_000)));
         assert_eq!(identity(boxes).identity_f1, 1.0);
+    }
+
+    #[test]
+    fn true_objects_are_matched_by_their_boxes() {
+        // 1 is mostly in 20, 2 in 10; 3 shares 20 with 1, and a box of it is alone in 30
+        let boxes = [(1, 20), (1, 20), (1, 20), (2, 10), (2, 20), (3, 20), (3, 20), (3, 30)];
+        assert_eq!(matched_objects(boxes), BTreeMap::from([(1, 20), (2, 10), (3, 30)]));
+        assert_eq!(matched_objects([(1, 5), (2, 5), (2, 5)]), BTreeMap::from([(2, 5)]));
+        assert!(matched_objects::<u32, u32>([]).is_empty());
     }
 }

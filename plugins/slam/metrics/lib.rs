@@ -18,7 +18,7 @@ pub use associate::{PosePair, associate};
 pub use bootstrap::{Interval, bootstrap, change_of_error};
 pub use error::relative_errors;
 pub use error::{Pairing, RelativeError, absolute_error, relative_error};
-pub use identity::{IdentityScores, identity};
+pub use identity::{IdentityScores, identity, matched_objects};
 pub use manifactor_geometry::Sim3;
 pub use pairing::pair_boxes;
 pub use statistics::Statistics;

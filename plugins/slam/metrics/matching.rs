@@ -2,12 +2,20 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Returns the largest sum of weights of a matching with at most one column per row, and at most one row per
-/// column.
+/// Returns the largest sum of weights of a matching, see [`largest_matching`].
+pub(super) fn largest_weight(rows: &[Vec<(usize, i64)>], columns: usize) -> i64 {
+    let weight = |(row, column): (&Vec<(usize, i64)>, Option<usize>)| {
+        row.iter().find(|(other, _)| Some(*other) == column).map_or(0, |(_, weight)| *weight)
+    };
+    rows.iter().zip(largest_matching(rows, columns)).map(weight).sum()
+}
+
+/// Returns the column of each row in a matching with the largest sum of weights, with at most one column per row, and
+/// at most one row per column. `None`: the row is not matched.
 ///
 /// `rows` has the columns and weights of each row; a pair that is not listed has weight zero. Rows are added
 /// one by one along the shortest augmenting path (Jonker and Volgenant, 1987).
-pub(super) fn largest_weight(rows: &[Vec<(usize, i64)>], columns: usize) -> i64 {
+pub(super) fn largest_matching(rows: &[Vec<(usize, i64)>], columns: usize) -> Vec<Option<usize>> {
     // an extra column per row allows the row to stay unmatched
     let edges = |row: usize| rows[row].iter().copied().chain([(columns + row, 0)]);
     let largest = |row: usize| edges(row).map(|(_, weight)| weight).max().unwrap_or(0);
@@ -52,10 +60,7 @@ pub(super) fn largest_weight(rows: &[Vec<(usize, i64)>], columns: usize) -> i64 
             free = column_of[row].replace(column);
         }
     }
-    let weight = |(row, column): (usize, Option<usize>)| {
-        edges(row).find(|(other, _)| Some(*other) == column).map_or(0, |(_, weight)| weight)
-    };
-    column_of.into_iter().enumerate().map(weight).sum()
+    column_of.into_iter().map(|column| column.filter(|column| *column < columns)).collect()
 }
 
 #[cfg(test)]

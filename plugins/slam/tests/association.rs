@@ -9,15 +9,17 @@ use manifactor_slam::association::{
 use manifactor_slam::association::{DetectionMove, MapEstimate, ObjectMerge};
 use manifactor_slam::class::ClassAliases;
 use manifactor_slam::fusion::FusedClass;
+use manifactor_slam::mapping::Warning;
 use manifactor_slam::measurement::{DepthMeasurement, Quantities};
 use manifactor_slam::measurements::ObjectMeasurements;
 use manifactor_slam::metrics::IdentityScores;
 use manifactor_slam::online::Mapper;
 use manifactor_slam::prior_map::PriorObject;
+use manifactor_slam::recording;
 use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::{self, Run};
 use manifactor_slam::run_document::RunDocument;
-use manifactor_slam::sequence::{Detection, ObjectId, Sequence};
+use manifactor_slam::sequence::{Detection, ObjectId, Sequence, UnusedInput};
 use manifactor_slam::settings::RunSettings;
 use manifactor_slam::source::InputFolders;
 use manifactor_solve::Silent;
@@ -89,6 +91,47 @@ fn names_of_the_source_make_no_difference() {
     let report = estimate(&settings, &Arc::new(nameless));
     assert_eq!(report.association.unwrap().in_the_end, None);
     assert!(report.counts.objects >= 9);
+}
+
+#[test]
+fn true_objects_are_compared_whatever_their_ids() {
+    let (settings, sequence) = scene(&[]);
+    let mut renamed = Sequence::clone(&sequence);
+    let other = |id: ObjectId| ObjectId(40 - id.0);
+    renamed.detections.iter_mut().for_each(|detection| detection.object = detection.object.map(other));
+    renamed.ground_truth.as_mut().unwrap().objects.iter_mut().for_each(|truth| truth.id = other(truth.id));
+    let compared = |sequence: &Arc<Sequence>| {
+        let landmarks = estimate(&settings, sequence).landmarks.unwrap();
+        (landmarks.objects, landmarks.estimate.rmse.position)
+    };
+    let found = compared(&Arc::new(renamed));
+    assert_eq!(found, compared(&sequence));
+    let known = estimate(&by(&settings, GivenAssociation {}), &sequence).landmarks.unwrap();
+    assert!(found.0 + 1 >= known.objects, "{found:?} of {}", known.objects);
+    assert!(found.1 < 1.5 * known.estimate.rmse.position, "{found:?} {}", known.estimate.rmse.position);
+    // without the ids of the source, nothing can be compared
+    let mut nameless = Sequence::clone(&sequence);
+    nameless.detections.iter_mut().for_each(|detection| detection.object = None);
+    let report = estimate(&settings, &Arc::new(nameless));
+    assert!(report.landmarks.is_none());
+    let is_told = |warning: &&Warning| warning.to_string().contains("10 true objects are not compared");
+    assert_eq!(report.warnings.iter().filter(is_told).count(), 1, "{:?}", report.warnings);
+}
+
+#[test]
+fn a_row_that_is_there_twice_makes_no_second_object() {
+    let (_, sequence) = scene(&[]);
+    let folder = tempfile::tempdir().unwrap();
+    recording::write(&sequence, folder.path()).unwrap();
+    let file = folder.path().join("detections.csv");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let (header, rows) = text.split_once('\n').unwrap();
+    std::fs::write(&file, format!("{header}\n{rows}{rows}")).unwrap();
+    let recorded =
+        format!("source={{ type = 'recorded', folder = {:?}, camera = 'freiburg1' }}", folder.path());
+    let (_, again) = scene(&[&recorded]);
+    assert_eq!(again.detections.len(), sequence.detections.len());
+    assert_eq!(again.unused.iter().map(UnusedInput::boxes).sum::<usize>(), sequence.detections.len());
 }
 
 #[test]

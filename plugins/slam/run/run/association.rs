@@ -86,6 +86,7 @@ pub(super) fn associate_sequence(
     for (detection, name) in named.detections.iter_mut().zip(history.current_objects(mapper.id_changes())) {
         detection.object = name;
     }
+    history.match_true_objects(&mut named, mapper.id_changes());
     let report = history.report(&*settings.association, mapper.id_changes());
     Ok(AssociatedSequence { sequence: Arc::new(named), report })
 }

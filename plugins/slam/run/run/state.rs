@@ -161,8 +161,11 @@ impl StreamState {
 
     /// Returns the map, and the accepted frames with the current objects of their boxes.
     pub(super) fn into_parts(self) -> (Mapper, Sequence, AssociationHistory) {
-        let Self { mapper, sequence, association, .. } = self;
-        let sequence = with_current_objects(sequence, &association, &mapper);
+        let Self { mapper, sequence, association, settings, .. } = self;
+        let mut sequence = with_current_objects(sequence, &association, &mapper);
+        if !settings.association.uses_source_ids() {
+            association.match_true_objects(&mut sequence, mapper.id_changes());
+        }
         (mapper, sequence, association)
     }
 }

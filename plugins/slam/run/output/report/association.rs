@@ -1,8 +1,8 @@
 //! Report of data association.
 use manifactor_association::{Association, ObjectIdChanges};
-use manifactor_metrics::{IdentityScores, identity};
+use manifactor_metrics::{IdentityScores, identity, matched_objects};
 use manifactor_online::FrameReport;
-use manifactor_recording::sequence::{Detection, ObjectId};
+use manifactor_recording::sequence::{Detection, ObjectId, Sequence, UnusedInput};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -104,6 +104,31 @@ impl AssociationHistory {
         self.boxes
             .iter()
             .map(|named| named.current_object(names).filter(|name| !self.forgotten.contains(name)))
+    }
+
+    /// Gives each true object of the sequence the id of the object that shares its boxes, in the one-to-one matching with
+    /// the most shared boxes: the ids of the association are not those of the source. A true object without a partner
+    /// gets an id that no object has. If the boxes have no objects in the source, the sequence gets a note.
+    pub(crate) fn match_true_objects(&self, sequence: &mut Sequence, names: &ObjectIdChanges) {
+        let Some(truth) = &mut sequence.ground_truth else { return };
+        if truth.objects.is_empty() {
+            return;
+        }
+        let pairs = self.boxes.iter().zip(self.current_objects(names));
+        let partners = matched_objects(pairs.filter_map(|(named, now)| Some((named.truth?, now?))));
+        let is_known = self.boxes.iter().any(|named| named.truth.is_some());
+        if !is_known && !self.boxes.is_empty() {
+            sequence.unused.push(UnusedInput::Recording(format!(
+                "{} true objects are not compared with the map, because the boxes do not name them; give the boxes the                  ids of the true objects as object_key, which data association does not read",
+                truth.objects.len()
+            )));
+        }
+        // the ids of a map or of a source are numbered from below
+        let mut free = (0..=u32::MAX).rev().map(ObjectId);
+        for object in &mut truth.objects {
+            let partner = partners.get(&object.id).copied().or_else(|| free.next());
+            object.id = partner.unwrap_or(object.id);
+        }
     }
 
     /// Returns the report; `None` if the objects of the source are used.
