@@ -66,7 +66,7 @@ const OPTIONAL: [&str; 6] =
 
 impl DetectionRow {
     /// Creates a row with only the required columns.
-    fn of_box(timestamp: f64, class: &str, score: f64, [xmin, ymin, xmax, ymax]: [f64; 4]) -> Self {
+    pub fn of_box(timestamp: f64, class: &str, score: f64, [xmin, ymin, xmax, ymax]: [f64; 4]) -> Self {
         Self {
             frame_idx: None,
             timestamp,

@@ -6,6 +6,7 @@ use crate::error::{FormatError, Mistake, ProblemList};
 use crate::text::read_text;
 use serde::Deserialize;
 use std::collections::HashMap;
+use std::fmt;
 use std::path::Path;
 
 /// Number of an image or a category; some programs write texts.
@@ -14,6 +15,15 @@ use std::path::Path;
 enum Id {
     Number(i64),
     Text(String),
+}
+
+impl fmt::Display for Id {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => number.fmt(f),
+            Self::Text(text) => write!(f, "{text:?}"),
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -36,6 +46,15 @@ struct Annotation {
     category_id: Id,
     bbox: [f64; 4],
     score: Option<f64>,
+    /// 1 if the box is around several objects.
+    #[serde(default)]
+    iscrowd: serde_json::Value,
+}
+
+impl Annotation {
+    fn is_one_object(&self) -> bool {
+        self.iscrowd != 1 && self.iscrowd != true
+    }
 }
 
 #[derive(Deserialize)]
@@ -93,14 +112,30 @@ pub(super) fn entries(
     frames
         .one_time_each(images.iter().map(|image| image.file_name.as_str()))
         .map_err(|text| fault(file, text))?;
-    let classes: HashMap<Id, String> =
-        categories.into_iter().map(|category| (category.id, category.name)).collect();
-    let names: HashMap<Id, String> = images.into_iter().map(|image| (image.id, image.file_name)).collect();
+    let categories = categories.into_iter().map(|category| (category.id, category.name));
+    let classes = by_id("categories", categories).map_err(|text| fault(file, text))?;
+    let images = images.into_iter().map(|image| (image.id, image.file_name));
+    let names = by_id("images", images).map_err(|text| fault(file, text))?;
     let entry = |(place, found): (usize, Annotation)| {
         let row = row(&found, &names, &classes, frames).and_then(DetectionRow::check);
         (0, row.map_err(|mistake| Mistake::Row(format!("annotation {}: {mistake}", place + 1))))
     };
-    Ok(annotations.into_iter().enumerate().map(entry).collect())
+    let objects = annotations.into_iter().enumerate().filter(|(_, found)| found.is_one_object());
+    Ok(objects.map(entry).collect())
+}
+
+/// Returns the names by id; an error if two of them have one id.
+fn by_id(what: &str, names: impl Iterator<Item = (Id, String)>) -> Result<HashMap<Id, String>, String> {
+    let mut all = HashMap::new();
+    for (id, name) in names {
+        if let Some(other) = all.get(&id).filter(|other| **other != name) {
+            return Err(format!(
+                "two {what} have the id {id}, `{other}` and `{name}`; expected one id for each"
+            ));
+        }
+        all.insert(id, name);
+    }
+    Ok(all)
 }
 
 fn row(
@@ -109,7 +144,7 @@ fn row(
     classes: &HashMap<Id, String>,
     frames: &Frames,
 ) -> Result<DetectionRow, Mistake> {
-    let missing = |what: &str, id: &Id| Mistake::Row(format!("there is no {what} with the id {id:?}"));
+    let missing = |what: &str, id: &Id| Mistake::Row(format!("there is no {what} with the id {id}"));
     let name = names.get(&found.image_id).ok_or_else(|| missing("image", &found.image_id))?;
     let class = classes.get(&found.category_id).ok_or_else(|| missing("category", &found.category_id))?;
     let [left, top, width, height] = found.bbox;

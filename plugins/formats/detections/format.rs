@@ -18,7 +18,8 @@ const MARGIN_PX: f64 = 3.0;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "format", rename_all = "snake_case", deny_unknown_fields)]
 pub enum DetectionFormat {
-    /// COCO: a file with `images`, `annotations` and `categories`, or a list of results.
+    /// COCO: a file with `images`, `annotations` and `categories`, or a list of results. Annotations with `iscrowd` are no
+    /// objects.
     Coco {
         /// The JSON file.
         file: PathBuf,
@@ -30,7 +31,8 @@ pub enum DetectionFormat {
         frames: Option<FrameTimes>,
     },
     /// YOLO: a folder with a text file per image, and lines `class x y width height [score]` with the centre and the
-    /// size as shares of the image, or `class x y x y x y …` with an outline.
+    /// size as shares of the image, or `class x y x y x y …` with an outline. Keypoints after the box, `x y visibility` each,
+    /// are not used.
     Yolo {
         /// Folder of the text files.
         folder: PathBuf,
@@ -40,7 +42,8 @@ pub enum DetectionFormat {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         frames: Option<FrameTimes>,
     },
-    /// MOT challenge: lines `frame,id,left,top,width,height,score,…`.
+    /// MOT challenge: lines `frame,id,left,top,width,height,score,…`. Of a ground truth, with nine fields, the rows that
+    /// are not to be considered are no objects.
     Mot {
         /// The text file.
         file: PathBuf,
@@ -89,9 +92,9 @@ impl DetectionFormat {
             }
             Self::Yolo { folder: labels, classes, frames } => {
                 let frames = Frames::of(frames.as_ref(), folder, 0)?;
-                let classes = read_text(&folder.join(classes))?;
-                let classes: Vec<&str> =
-                    classes.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+                let file = folder.join(classes);
+                let classes = read_text(&file)?;
+                let classes = yolo::classes(&file, &classes)?;
                 let labels = folder.join(labels);
                 let mut rows = vec![];
                 let files = text_files(&labels)?;

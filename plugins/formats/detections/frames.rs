@@ -55,9 +55,15 @@ impl Frames {
                 let file = folder.join(file);
                 let text = read_text(&file)?;
                 let mut problems = ProblemList::of(&file, &text);
-                let mut times = vec![];
+                let mut times: Vec<f64> = vec![];
                 for (line, text) in lines(&text) {
                     let time = number(text.split([' ', ',', '\t']).next().unwrap_or_default());
+                    let time = time.and_then(|time| match times.last() {
+                        Some(last) if time <= *last => Err(Mistake::Row(format!(
+                            "expected a time after that of the image before, {last} s, got {time} s"
+                        ))),
+                        _ => Ok(time),
+                    });
                     times.extend(problems.ok(line, time));
                 }
                 problems.finish()?;

@@ -5,8 +5,15 @@ use super::frames::Frames;
 use crate::error::Mistake;
 use crate::lines::{id, lines, number};
 
+/// Number of fields of a row of a ground truth: frame, id, box, whether it is considered, class and visibility.
+const TRUTH: usize = 9;
+
 pub(super) fn entries(text: &str, class: &str, frames: &Frames) -> Vec<Entry> {
-    lines(text).map(|(line, text)| (line, row(text, class, frames))).collect()
+    let is_object = |(_, text): &(usize, &str)| {
+        let mut fields = text.split(',').map(str::trim);
+        fields.clone().count() != TRUTH || fields.nth(6) != Some("0")
+    };
+    lines(text).filter(is_object).map(|(line, text)| (line, row(text, class, frames))).collect()
 }
 
 fn row(text: &str, class: &str, frames: &Frames) -> Result<DetectionRow, Mistake> {

@@ -338,7 +338,7 @@ fn unused_warnings<'a>(all: impl Iterator<Item = &'a UnusedInput>, without_area:
         }
     }
     if let Some(first) = first {
-        let what = format!("boxes that cannot be read are left out: {boxes}, the first {first}");
+        let what = format!("boxes that cannot be used are left out: {boxes}, the first {first}");
         warnings.push(Warning::Unused { what });
     }
     if let Some(first) = first_image {

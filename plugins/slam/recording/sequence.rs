@@ -53,7 +53,8 @@ pub struct Sequence {
 }
 
 /// Unused input of a source, with the reason.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum UnusedInput {
     /// Rows of a file whose time has no pose.
     WithoutPose(DetectionsWithoutPose),
@@ -99,7 +100,7 @@ impl UnusedInput {
 }
 
 /// Detections whose time has no pose.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DetectionsWithoutPose {
     /// Number of rows without a pose.
     pub rows: usize,
@@ -277,6 +278,25 @@ pub struct Detection {
     pub quantities: Quantities,
     /// Outline of the object, if measured. It belongs to the box.
     pub ellipse: Option<ImageEllipse>,
+}
+
+/// Removes the boxes of an image that repeat an earlier one in everything, as from a table that was appended twice: each
+/// would be an object of its own. Returns the positions of the repeated boxes and of the earlier ones, from 1.
+pub(crate) fn remove_repeated(boxes: &mut Vec<Detection>) -> Vec<[usize; 2]> {
+    let earlier = |place: usize| boxes.iter().take(place).position(|other| boxes.get(place) == Some(other));
+    let repeated: Vec<[usize; 2]> =
+        (0..boxes.len()).filter_map(|place| Some([place + 1, earlier(place)? + 1])).collect();
+    for [place, _] in repeated.iter().rev() {
+        boxes.remove(place - 1);
+    }
+    repeated
+}
+
+impl UnusedInput {
+    /// A box that repeats an earlier one of its image.
+    pub(crate) fn repeated(timestamp: f64, [place, earlier]: [usize; 2]) -> Self {
+        Self::Box { timestamp, place, fault: format!("it repeats box {earlier} in all numbers") }
+    }
 }
 
 impl Detection {

@@ -130,11 +130,32 @@ fn a_form_or_unit_that_does_not_fit_is_named() {
             "expected a score from 0 to 1, got 80",
         ),
         (of_coco(&|file| file["images"][0]["file_name"] = json!("left.png")), "is no time in seconds"),
+        (
+            of_coco(&|file| {
+                file["categories"].as_array_mut().unwrap().push(json!({"id": 47, "name": "spoon"}));
+            }),
+            "two categories have the id",
+        ),
+        (
+            of_coco(&|file| {
+                let again = json!({"id": file["images"][0]["id"], "file_name": "12.5.png"});
+                file["images"].as_array_mut().unwrap().push(again);
+            }),
+            "two images have the id",
+        ),
         (of_coco(&|file| *file = json!([])), "set `images` to the file"),
         (of_coco(&|file| *file = json!({"images": []})), "missing field `categories`"),
         (of_mot("0,-1,1,1,9,9,0.5,-1,-1,-1\n"), "det.txt:1: image 0 comes before the first one, 1"),
         (of_mot("3,-1,1,1,9,9,0.5,-1,-1,-1\n"), "has 2 times, from image 1"),
         (of_mot("1,-1,1,1,9,9,-0.5\n"), "expected a score from 0 to 1"),
+        (
+            read(
+                json!({"format": "mot", "file": "det.txt", "class": "person", "frames": frames}),
+                &[("det.txt", "1,-1,1,1,9,9,0.5\n"), ("times.txt", "10\n10\n")],
+            )
+            .unwrap_err(),
+            "times.txt:2: expected a time after that of the image before, 10 s, got 10 s",
+        ),
         (of_mot("1 -1 1 1 9 9 0.5\n"), "expected 7 fields"),
         (of_mot("1,-1,x,1,9,9,0.5\n"), "det.txt:1: expected a finite number"),
         (
@@ -156,4 +177,56 @@ fn a_form_or_unit_that_does_not_fit_is_named() {
     }
     let neither = json!({"format": "kitti", "file": "a.txt", "frames": {}});
     assert!(read(neither, &[("a.txt", "")]).unwrap_err().contains("either `rate` or `times`"));
+}
+
+#[test]
+fn keypoints_after_a_box_are_no_outline() {
+    let yolo = json!({"format": "yolo", "folder": "labels", "classes": "names.txt"});
+    let sides = |line: &str| {
+        let files = [("names.txt", "\u{feff}cup\nbook\n"), ("labels/10.5.txt", line)];
+        let row = read(yolo.clone(), &files).unwrap().remove(0);
+        assert_eq!(row.class_name, "cup");
+        [row.xmin, row.ymin, row.xmax, row.ymax].map(|x| (x * 10.0).round() / 10.0)
+    };
+    let of_box = sides("0 0.5 0.5 0.2 0.4\n");
+    assert_eq!(of_box, [256.0, 144.0, 384.0, 336.0]);
+    // two and three keypoints, of which one is hidden
+    assert_eq!(sides("0 0.5 0.5 0.2 0.4 0.45 0.4 2 0.55 0.6 1\n"), of_box);
+    assert_eq!(sides("0 0.5 0.5 0.2 0.4 0.45 0.4 2 0 0 0 0.55 0.6 1\n"), of_box);
+    // an outline of five corners
+    assert_eq!(sides("0 0.5 0.5 0.6 0.5 0.6 0.6 0.55 0.7 0.5 0.6\n"), [320.0, 240.0, 384.0, 336.0]);
+}
+
+#[test]
+fn a_list_of_classes_has_one_name_per_line() {
+    let fault = |name: &str, text: &str| {
+        let yolo = json!({"format": "yolo", "folder": "labels", "classes": name});
+        read(yolo, &[(name, text), ("labels/10.5.txt", "0 0.5 0.5 0.1 0.1\n")]).unwrap_err()
+    };
+    for (name, text, words) in [
+        ("data.yaml", "names: [cup]\n", "write the `names` of the YAML file as lines"),
+        ("names.txt", "cup\n\nbook\n", "names.txt:2: expected a class, got an empty line"),
+        ("names.txt", "0: cup\n1: book\n", "names.txt:1: expected the name of a class alone"),
+        ("names.txt", "train: a\nnames:\n", "names.txt:2: expected the name of a class alone"),
+    ] {
+        let fault = fault(name, text);
+        assert!(fault.contains(words), "{fault}");
+    }
+}
+
+#[test]
+fn rows_of_a_truth_that_are_not_considered_are_no_objects() {
+    let mot = json!({"format": "mot", "file": "gt.txt", "class": "person", "frames": {"times": "times.txt"}});
+    let rows = "1,1,1,1,9,9,1,1,1.0\n1,2,20,1,9,9,0,8,0.5\n2,3,1,1,9,9,1,1,0.2\n";
+    assert_eq!(read(mot.clone(), &[("gt.txt", rows), ("times.txt", "10\n11\n")]).unwrap().len(), 2);
+    // detections with a score of zero have ten fields
+    let rows = "1,-1,1,1,9,9,0,-1,-1,-1\n";
+    assert_eq!(read(mot, &[("gt.txt", rows), ("times.txt", "10\n11\n")]).unwrap().len(), 1);
+}
+
+#[test]
+fn a_crowd_is_no_object() {
+    let file = coco(|file| file["annotations"][0]["iscrowd"] = json!(1));
+    let rows = read(json!({"format": "coco", "file": "a.json"}), &[("a.json", &file)]).unwrap();
+    assert_eq!(rows.iter().map(|row| row.class_name.as_str()).collect::<Vec<_>>(), ["book"]);
 }

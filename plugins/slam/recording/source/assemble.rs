@@ -6,6 +6,7 @@ use crate::measurement::{DepthMeasurement, Quantities};
 use crate::recording::OBJECTS_FILE;
 use crate::sequence::{
     ClassScores, Detection, DetectionsWithoutPose, Frame, GroundTruth, ObjectId, TrueObject, UnusedInput,
+    remove_repeated,
 };
 use manifactor_config::{Document, Errors};
 use manifactor_formats::detections::DetectionRow;
@@ -13,6 +14,7 @@ use manifactor_formats::tum;
 use manifactor_formats::tum::{StampedPose, Trajectory};
 use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_quadric::BoundingBox;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -112,6 +114,7 @@ pub(super) fn match_by_time(
             nearest,
         });
     }
+    let merged = merged_images(&rows, |at| is_matched(at).map(|(frame, _)| frame));
     let matched = rows.into_iter().filter_map(|(at, detection)| {
         let (frame, _) = is_matched(at)?;
         Some(Detection { frame, ..detection })
@@ -119,7 +122,33 @@ pub(super) fn match_by_time(
     let mut matched: Vec<Detection> = matched.collect();
     // stable, so that the order of the file decides between duplicates
     matched.sort_by_key(|detection| detection.frame);
-    Ok((frames, matched, without.map(UnusedInput::WithoutPose).into_iter().collect()))
+    let mut unused: Vec<UnusedInput> = without.map(UnusedInput::WithoutPose).into_iter().collect();
+    if merged > 0 {
+        unused.push(UnusedInput::Recording(format!(
+            "{merged} images have the same nearest pose as another image, and their boxes are taken for those of one image; \
+             `source.max_pose_gap` gives each image a pose of its own, a smaller `source.max_time_difference` leaves them out"
+        )));
+    }
+    let mut kept = Vec::with_capacity(matched.len());
+    for boxes in matched.chunk_by(|a, b| a.frame == b.frame) {
+        let mut boxes = boxes.to_vec();
+        let repeated = remove_repeated(&mut boxes);
+        let time = boxes.first().and_then(|first| times.get(first.frame)).copied().unwrap_or_default();
+        unused.extend(repeated.into_iter().map(|places| UnusedInput::repeated(time, places)));
+        kept.extend(boxes);
+    }
+    Ok((frames, kept, unused))
+}
+
+/// Returns the number of images that share their frame with an earlier image of their camera.
+fn merged_images(rows: &[(f64, Detection)], frame: impl Fn(f64) -> Option<usize>) -> usize {
+    let mut images: BTreeMap<(usize, &str), BTreeSet<u64>> = BTreeMap::new();
+    for (at, detection) in rows {
+        if let Some(frame) = frame(*at) {
+            images.entry((frame, &detection.camera.name)).or_default().insert(at.to_bits());
+        }
+    }
+    images.values().map(|times| times.len() - 1).sum()
 }
 
 /// Returns a frame for each image that lies between two poses.

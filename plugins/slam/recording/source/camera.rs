@@ -113,7 +113,9 @@ pub(super) fn with_distortion(
     model: &str,
     coefficients: &[f64],
 ) -> Result<Arc<dyn AnyCamera>, String> {
-    if coefficients.iter().all(|coefficient| *coefficient == 0.0) {
+    // a fisheye without distortion is no pinhole
+    let is_fisheye = matches!(model, "equidistant" | "fisheye");
+    if !is_fisheye && coefficients.iter().all(|coefficient| *coefficient == 0.0) {
         return Ok(Arc::new(camera));
     }
     match model {
@@ -122,7 +124,7 @@ pub(super) fn with_distortion(
                 Distortion::try_from(coefficients.to_vec()).map_err(|error| error.to_string())?;
             Ok(Arc::new(RadialTangential::new(camera, distortion)))
         }
-        "equidistant" | "fisheye" => match *coefficients {
+        _ if is_fisheye => match *coefficients {
             [k1, k2, k3, k4] => Ok(Arc::new(KannalaBrandt::new(camera, [k1, k2, k3, k4]))),
             _ => Err(format!("expected 4 coefficients of `{model}`, got {}", coefficients.len())),
         },
@@ -149,6 +151,20 @@ pub(super) fn by_folder(folder: &Path) -> Result<Camera, SourceError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn zeros_are_no_distortion_of_a_pinhole_and_an_ideal_fisheye() {
+        let camera = preset(PRESETS[0].1);
+        let read = |model, coefficients: &[f64]| {
+            with_distortion(camera, model, coefficients).map(|camera| format!("{camera:?}"))
+        };
+        for model in ["plumb_bob", "none", ""] {
+            assert!(read(model, &[0.0; 5]).unwrap().starts_with("Camera"));
+            assert!(read(model, &[]).unwrap().starts_with("Camera"));
+        }
+        assert!(read("equidistant", &[0.0; 4]).unwrap().starts_with("KannalaBrandt"));
+        assert!(read("equidistant", &[]).unwrap_err().contains("expected 4 coefficients"));
+    }
 
     #[test]
     fn names_and_folders_tell_the_same_camera() {

@@ -70,10 +70,16 @@ impl CalibrationFile {
         };
         let names = || cameras.iter().map(|(name, _)| format!("`{name}`")).collect::<Vec<_>>().join(", ");
         let found = match &self.name {
-            Some(wanted) => cameras
-                .iter()
-                .find(|(name, _)| name == wanted)
-                .ok_or_else(|| fault(format!("there is no camera `{wanted}`; there are {}", names())))?,
+            Some(wanted) => {
+                let mut named = cameras.iter().filter(|(name, _)| name == wanted);
+                match (named.next(), named.next()) {
+                    (Some(found), None) => found,
+                    (Some(_), Some(_)) => return Err(fault(format!("there are several cameras `{wanted}`"))),
+                    (None, _) => {
+                        return Err(fault(format!("there is no camera `{wanted}`; there are {}", names())));
+                    }
+                }
+            }
             None => match &cameras[..] {
                 [only] => only,
                 [] => {
@@ -121,11 +127,15 @@ fn yaml(file: &Path, text: &str) -> Result<Vec<NamedCamera>, SourceError> {
 fn opencv(camera: &OpenCvCamera) -> Result<Arc<dyn AnyCamera>, String> {
     let OpenCvCamera { image_width, image_height, camera_matrix, distortion_coefficients, distortion_model } =
         camera;
-    let [fx, _, cx, _, fy, cy, ..] = camera_matrix.data[..] else {
-        return Err(format!("expected 9 numbers in `camera_matrix`, got {}", camera_matrix.data.len()));
+    let [fx, skew, cx, 0.0, fy, cy, 0.0, 0.0, 1.0] = camera_matrix.data[..] else {
+        return Err(format!(
+            "expected `camera_matrix` with the 9 numbers fx, skew, cx, 0, fy, cy, 0, 0, 1, row by row, got {:?}",
+            camera_matrix.data
+        ));
     };
     let pinhole =
         Camera::new([fx, fy, cx, cy], *image_width, *image_height).map_err(|error| error.to_string())?;
+    let pinhole = Camera { skew, ..pinhole };
     let model = distortion_model.as_deref().unwrap_or("plumb_bob");
     with_distortion(pinhole, model, &distortion_coefficients.data)
 }
@@ -283,6 +293,14 @@ cam2:
         assert_eq!((camera.pinhole().fy, camera.pinhole().cy), (516.5, 255.3));
         let ros = "image_width: 848\nimage_height: 800\ncamera_name: wide\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [285.7, 0, 425.5, 0, 286.9, 384.2, 0, 0, 1]\ndistortion_model: equidistant\ndistortion_coefficients:\n  rows: 1\n  cols: 4\n  data: [-0.005, 0.04, -0.04, 0.006]\n";
         assert!(format!("{:?}", read("wide.yaml", ros, None).unwrap()).starts_with("KannalaBrandt"));
+        let skewed = opencv.replace("517.3, 0.,", "517.3, 0.5,");
+        assert_eq!(read("left.yml", &skewed, None).unwrap().pinhole().skew, 0.5);
+        let transposed = opencv.replace(
+            "517.3, 0., 318.6, 0., 516.5, 255.3, 0., 0.",
+            "517.3, 0., 0., 0., 516.5, 0., 318.6, 255.3",
+        );
+        let error = read("left.yml", &transposed, None).unwrap_err();
+        assert!(error.contains("fx, skew, cx, 0, fy, cy, 0, 0, 1, row by row"), "{error}");
         let error = read("wide.yaml", &ros.replace("equidistant", "fov"), None).unwrap_err();
         assert!(error.contains("camera `wide`: expected the distortion model"), "{error}");
     }
@@ -293,6 +311,9 @@ cam2:
         let radial = read("cameras.txt", text, Some("1")).unwrap();
         assert_eq!((radial.pinhole().fx, radial.pinhole().fy, radial.pinhole().cx), (500.0, 500.0, 400.0));
         assert!(format!("{:?}", read("cameras.txt", text, Some("7")).unwrap()).starts_with("KannalaBrandt"));
+        let twice = "1 PINHOLE 800 600 5 5 4 3\n1 PINHOLE 800 600 6 6 4 3\n";
+        let error = read("cameras.txt", twice, Some("1")).unwrap_err();
+        assert!(error.contains("there are several cameras `1`"), "{error}");
         for (wrong, words) in [
             ("1 SIMPLE_RADIAL 800 600 500 400 300\n", "number of parameters"),
             ("1 FOV 800 600 500 500 400 300 0.9\n", "got FOV"),

@@ -4,7 +4,9 @@ use crate::camera::Cameras;
 use crate::ellipse::ImageEllipse;
 use crate::measurement::{Quantities, measurement_schemas};
 use crate::sequence::pose_graph::{PoseFactor, PoseGraphChanges};
-use crate::sequence::{Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, UnusedInput};
+use crate::sequence::{
+    Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, UnusedInput, remove_repeated,
+};
 use indexmap::IndexMap;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -231,6 +233,8 @@ pub(super) fn parse_line(line: &[u8], cameras: &Cameras) -> Result<PoseOrImage, 
             Err(fault) => unused.push(UnusedInput::Box { timestamp, place: place + 1, fault }),
         }
     }
+    let repeated = remove_repeated(&mut detections).into_iter();
+    unused.extend(repeated.map(|places| UnusedInput::repeated(timestamp, places)));
     let mut frame = Frame::new(timestamp, pose.unwrap_or_else(Se3::identity));
     match odometry_noise.map(read_noise).transpose() {
         Ok(noise) => frame.odometry_noise = noise,
