@@ -1,7 +1,7 @@
 //! Journal of frames on disk, which lets an interrupted stream continue.
 //!
 //! The journal's key is the fingerprint of the settings. Each record is a frame in the format of the source
-//! `json_lines`. Equal frames give equal bits: a program that was killed reads the frames again and arrives
+//! `json_lines`, with the input of the frame that was not used. Equal frames give equal bits: a program that was killed reads the frames again and arrives
 //! at the same map.
 //!
 //! If a frame cannot be written, for example on a full disk, it is still mapped. The journal ends there, and
@@ -9,13 +9,17 @@
 use super::stream::FrameStream;
 use crate::camera::Cameras;
 use crate::sequence::Observation;
-use crate::source::{format_line, parse};
+use crate::source::{SourceError, format_line, parse};
 use manifactor_formats::journal::{Journal, JournalError, JournalRecord};
 use manifactor_graph::Manifold;
-use std::collections::HashSet;
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Field of a record with the input that was not used.
+const UNUSED: &str = "unused_input";
 
 impl JournalRecord for Observation {
     type Context = Cameras;
@@ -23,29 +27,52 @@ impl JournalRecord for Observation {
     const HEADER_STARTS: &'static [&'static str] = &[r#"{"checked_frames_for":""#, r#"{"frames_for":""#];
 
     fn write(&self) -> io::Result<String> {
-        Ok(format_line(self))
+        let line = format_line(self);
+        let Some(fields) = line.strip_suffix('}').filter(|_| !self.unused.is_empty()) else {
+            return Ok(line);
+        };
+        Ok(format!("{fields},\"{UNUSED}\":{}}}", serde_json::to_string(&self.unused)?))
     }
 
     fn read(line: &[u8], cameras: &Cameras) -> Result<Self, String> {
-        parse(line, cameras)
+        let separator = format!(",\"{UNUSED}\":");
+        let text = std::str::from_utf8(line).map_err(|error| error.to_string())?;
+        // boxes have no field of this name, so the last one is that of the record
+        let Some((fields, unused)) = text.rsplit_once(&separator) else { return parse(line, cameras) };
+        let unused = unused.strip_suffix('}').unwrap_or(unused);
+        let unused = serde_json::from_str(unused).map_err(|error| error.to_string())?;
+        Ok(Self { unused, ..parse(format!("{fields}}}").as_bytes(), cameras)? })
     }
 }
 
 /// Returns the frames of a journal, followed by the new frames of the stream, which are appended to the
-/// journal. If there is no journal, it is created.
+/// journal. If there is no journal, it is created. A frame of the stream with the time of a recorded one is the same
+/// frame again, or else the error [`SourceError::OtherJournal`].
 ///
 /// # Errors
 /// A file that cannot be read or written, is a link, or is not the journal of these settings. It stays
 /// unchanged.
 pub fn journaled(stream: FrameStream, path: &Path, fingerprint: &str) -> Result<FrameStream, JournalError> {
-    let (mut journal, before) =
-        Journal::<Observation>::open(path, fingerprint, stream.opening.cameras.clone())?;
+    let cameras = stream.opening.cameras.clone();
+    let (mut journal, before) = Journal::<Observation>::open(path, fingerprint, cameras.clone())?;
     let past = before.iter().map(|frame| frame.frame.timestamp).fold(f64::NEG_INFINITY, f64::max);
-    let had: HashSet<u64> = before.iter().map(|frame| frame.frame.timestamp.to_bits()).collect();
-    let is_new = move |frame: &Result<Observation, _>| {
-        frame.as_ref().map_or(true, |frame| !had.contains(&frame.frame.timestamp.to_bits()))
+    let content = |frame: &Observation| {
+        let mut hash = DefaultHasher::new();
+        format_line(frame).hash(&mut hash);
+        hash.finish()
     };
-    let new = stream.observations.filter(is_new);
+    let recorded: HashMap<u64, u64> =
+        before.iter().map(|frame| (frame.frame.timestamp.to_bits(), content(frame))).collect();
+    let file = path.to_owned();
+    let new = stream.observations.filter_map(move |frame| {
+        let Ok(observation) = &frame else { return Some(frame) };
+        let timestamp = observation.frame.timestamp;
+        let Some(known) = recorded.get(&timestamp.to_bits()) else { return Some(frame) };
+        // as it was recorded: writing may change the last digits
+        let again = parse(format_line(observation).as_bytes(), &cameras);
+        let is_same = again.is_ok_and(|again| content(&again) == *known);
+        (!is_same).then(|| Err(SourceError::OtherJournal { file: file.clone(), timestamp }))
+    });
     let lost = LostFrameCounter::default();
     let (path, counted) = (path.to_owned(), lost.clone());
     let kept = new.map(move |frame| {
@@ -99,14 +126,14 @@ fn append_frame(journal: &mut Journal<Observation>, frame: &Observation) -> io::
     if !(frame.frame.timestamp.is_finite() && frame.frame.world_from_camera.is_finite()) {
         return Ok(frame.clone());
     }
-    Ok(Observation { unused: frame.unused.clone(), ..journal.append(frame)? })
+    journal.append(frame)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    use crate::sequence::{ClassScores, Detection, Frame, ObjectId, SequenceHeader};
+    use crate::sequence::{ClassScores, Detection, Frame, ObjectId, SequenceHeader, UnusedInput};
     use manifactor_geometry::Se3;
     use manifactor_quadric::{BoundingBox, Camera};
     use nalgebra::Vector6;
@@ -150,6 +177,45 @@ mod tests {
             assert_eq!(frames(journaled(stream(), &path, "7").unwrap(), 99), expected, "cut off at {end}");
             assert_eq!(std::fs::read(&path).unwrap()[..whole.len()], whole);
         }
+    }
+
+    #[test]
+    fn what_was_not_used_is_told_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frames.jsonl");
+        let with_faults = || {
+            let mut stream = stream();
+            let faulty = |frame: Result<Observation, SourceError>| {
+                frame.map(|frame| {
+                    let fault = ",\"unused_input\":[{\"}".to_owned();
+                    let unused = UnusedInput::Box { timestamp: frame.frame.timestamp, place: 2, fault };
+                    Observation { unused: vec![unused, UnusedInput::Recording("x".into())], ..frame }
+                })
+            };
+            stream.observations = Box::new(stream.observations.map(faulty));
+            stream
+        };
+        let expected = frames(journaled(with_faults(), &path, "7").unwrap(), 99);
+        assert_eq!(frames(journaled(with_faults(), &path, "7").unwrap(), 99), expected);
+        assert!(expected.iter().all(|frame| frame.unused.len() == 2));
+    }
+
+    #[test]
+    fn another_stream_is_refused_at_its_first_frame() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frames.jsonl");
+        frames(journaled(stream(), &path, "7").unwrap(), 5);
+        let mut other = stream();
+        other.observations = Box::new(other.observations.skip(2).map(|frame| {
+            let mut frame = frame.unwrap();
+            frame.detections[0].bounding_box.xmin -= 0.25;
+            Ok(frame)
+        }));
+        let after: Vec<_> = journaled(other, &path, "7").unwrap().observations.skip(5).take(2).collect();
+        assert!(
+            matches!(after[0], Err(SourceError::OtherJournal { timestamp, .. }) if timestamp > 10.2),
+            "{after:?}"
+        );
     }
 
     #[test]

@@ -8,6 +8,7 @@ use manifactor_mapping::mapping::Warning;
 use manifactor_mapping::settings::RunSettings;
 use manifactor_online::{FrameError, FrameReport, Mapper};
 use manifactor_recording::sequence::Observation;
+use manifactor_recording::source::SourceError;
 use manifactor_recording::stream::confirmed::OrderedFrames;
 use manifactor_recording::stream::{FrameStream, PrefetchedFrames};
 use manifactor_solve::{IterationRecord, Observer};
@@ -20,7 +21,8 @@ use std::time::Instant;
 /// its source, that thread ends with the next frame.
 ///
 /// # Errors
-/// If the smoother cannot be started, or the final graph cannot be created. Rejected frames are events.
+/// If the smoother cannot be started, the final graph cannot be created, or the journal is that of another stream.
+/// Rejected frames are events.
 pub fn online(
     name: &str,
     stream: FrameStream,
@@ -41,6 +43,10 @@ pub fn online(
                 break;
             }
         };
+        // the map so far is that of another stream
+        if let Err(error @ SourceError::OtherJournal { .. }) = observation {
+            return Err(error.into());
+        }
         if let Ok(observation) = &observation
             && observation.frame.timestamp > stream.recorded_frames
             && watch.event(StreamEvent::FrameArrived { timestamp: observation.frame.timestamp }).is_break()
