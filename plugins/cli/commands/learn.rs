@@ -37,6 +37,7 @@ impl Learn {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         self.check_out()?;
         let maps: Vec<PriorMap> = self.maps.iter().map(|map| read(map)).collect::<Result<_, _>>()?;
+        self.warn_of_repeated_objects(&maps);
         let learned = LearnedPriors::learn(&maps).map_err(|error| {
             Failure::with_help(error, "give the map.json of a run that maps objects of known classes")
         })?;
@@ -52,6 +53,25 @@ impl Learn {
         let written = format!("\n{classes} from {objects} written to {}\n", self.out.display());
         output::print(&(table(&learned).text() + &written));
         Ok(Status::Done)
+    }
+
+    /// Warns of maps of one room: an object in several maps counts as several, which makes the priors too strong.
+    fn warn_of_repeated_objects(&self, maps: &[PriorMap]) {
+        for (i, map) in maps.iter().enumerate() {
+            let earlier = maps.iter().zip(&self.maps).take(i);
+            for (other, path) in earlier {
+                let (shared, smaller) =
+                    (map.shared_objects(other), map.objects.len().min(other.objects.len()));
+                if 2 * shared > smaller {
+                    let again = self.maps.get(i).unwrap_or(path).display();
+                    output::print_message(&format!(
+                        "warning: {shared} of {} in {again} are also in {}, and count twice: give one map of each room",
+                        count(map.objects.len(), "object"),
+                        path.display()
+                    ));
+                }
+            }
+        }
     }
 
     /// Returns an error if the rules cannot be written.

@@ -128,6 +128,17 @@ impl PriorMap {
         errors.finish(map)
     }
 
+    /// Returns the number of objects that `other` has too: with the same class at the same place, up to half of their
+    /// length. Maps of one room in one frame share most objects.
+    pub fn shared_objects(&self, other: &Self) -> usize {
+        let is_same = |a: &PriorObject, b: &PriorObject| {
+            let length = a.quadric.semi_axes.max().min(b.quadric.semi_axes.max());
+            let apart = (a.quadric.pose.translation - b.quadric.pose.translation).norm();
+            apart < length && a.classes.is_compatible(&b.classes)
+        };
+        self.objects.iter().filter(|a| other.objects.iter().any(|b| is_same(a, b))).count()
+    }
+
     /// Returns the map with the canonical class names of `aliases`.
     pub fn with_classes(mut self, aliases: &ClassAliases) -> Self {
         for object in &mut self.objects {

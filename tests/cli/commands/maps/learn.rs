@@ -17,6 +17,7 @@ fn a_run_takes_what_another_has_learned() {
     let (folder, map) = mapped();
     let (priors, out) = (path(&folder, "priors.toml"), path(&folder, "second"));
     let learned = manifactor(&format!("learn {map} {map} --out {priors}")).ended(0);
+    learned.complains("count twice: give one map of each room");
     assert!(learned.stdout.contains("written to") && learned.stdout.contains("all"), "{}", learned.stdout);
     assert!(fs::read_to_string(&priors).unwrap().contains("by `manifactor learn` from"));
     let desk = path(&folder, "desk.toml");
