@@ -219,7 +219,7 @@ fn experiment_of(
     if let Some(shard) = shard {
         sweep.restrict_to_shard(shard);
     }
-    let folders = InputFolders { data, document: sweep.folder.clone() };
+    let folders = sweep.open_inputs(data);
     let interrupt = Interrupt::default();
     let mut raised = None;
     let show = |now: ExperimentProgress| {
@@ -281,7 +281,7 @@ impl Sweep {
         if let Some(out) = out {
             sweep.output = out;
         }
-        let folders = InputFolders { data, document: sweep.folder.clone() };
+        let folders = sweep.open_inputs(data);
         let journal = is_driver.then(|| {
             let claimed =
                 OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(errors::failure)?;

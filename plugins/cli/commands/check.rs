@@ -96,7 +96,7 @@ impl Check {
         let mut run = Running::new(&document, self.run.data());
         for variant in &document.variants {
             match run.find_files(variant) {
-                Ok(()) => {}
+                Ok(_) => {}
                 // a document about a public data set is correct without the data
                 Err(SourceError::NoFolder { setting, name, no_data_folder: true, .. })
                     if name.is_relative() && !self.load =>

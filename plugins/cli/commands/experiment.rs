@@ -13,7 +13,6 @@ use manifactor::slam::experiment::{
     self, Experiment as Sweep, ExperimentProgress, ExperimentSummary, Shard, TrialLog,
 };
 use manifactor::slam::output::{OutputFolder, write_whole};
-use manifactor::slam::source::InputFolders;
 use manifactor::solve::{Interrupt, Observer};
 use manifactor::viz::{experiment_page, experiment_pictures};
 use std::io::IsTerminal;
@@ -68,7 +67,7 @@ impl Experiment {
         if let Some(shard) = self.shard {
             sweep.restrict_to_shard(shard);
         }
-        let folders = InputFolders { data: self.data.clone(), document: sweep.folder.clone() };
+        let folders = sweep.open_inputs(self.data.clone());
         let claimed = OutputFolder::claim(&sweep.output, "experiment", &self.config, self.force)?;
         let mut journal = TrialLog::open(claimed)?;
         journal.take_over_shards()?;

@@ -198,5 +198,5 @@ fn trial<'a>(
             merge(&mut node, set.clone());
         }
     }
-    Ok(Trial { labels, settings: RunSettings::read(&node, folder)? })
+    Ok(Trial { labels, settings: RunSettings::read(&node, folder)?, inputs: 0 })
 }

@@ -26,6 +26,7 @@
 //! depend on concurrent work. A finished trial is written to a [`TrialLog`] and is not run again. The tables
 //! are made from this log.
 mod document;
+mod inputs;
 mod journal;
 mod measures;
 mod output;

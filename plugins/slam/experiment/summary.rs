@@ -4,7 +4,7 @@ mod table;
 
 use crate::document::{Experiment, SummarySettings};
 use crate::journal::TrialLog;
-use crate::trial::TrialRecord;
+use crate::trial::{AT_JUMP, TrialRecord};
 use indexmap::{IndexMap, IndexSet};
 use manifactor_metrics::{Interval, bootstrap};
 use serde::Serialize;
@@ -120,7 +120,7 @@ impl<'a> SummaryBuilder<'a> {
             labels: key.iter().map(|label| (*label).to_owned()).collect(),
             trials: members.len(),
             failed: count(|status| status == "failed"),
-            not_converged: count(|status| !["failed", "converged", "stalled"].contains(&status)),
+            not_converged: count(|status| !["failed", "converged", AT_JUMP].contains(&status)),
             means: metrics().filter_map(mean).collect(),
             comparisons: metrics().filter(|_| !is_baseline).filter_map(compare).collect(),
         }

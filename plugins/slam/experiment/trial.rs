@@ -4,7 +4,7 @@ use indexmap::IndexMap;
 use manifactor_mapping::settings::RunSettings;
 use manifactor_recording::source::InputFolders;
 use manifactor_run::run::{RunError, estimate};
-use manifactor_solve::{Observer, Termination};
+use manifactor_solve::{Observer, Stall, Termination};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Instant;
@@ -16,6 +16,8 @@ pub struct Trial {
     pub labels: Vec<String>,
     /// Complete settings.
     pub settings: RunSettings,
+    /// Hash of the input files, see [`Experiment::open_inputs`](crate::Experiment::open_inputs); 0 without files.
+    pub inputs: u64,
 }
 
 /// Outcome of a trial.
@@ -24,7 +26,7 @@ pub struct Trial {
 pub enum TrialOutcome {
     /// The trial was solved, to a minimum or not: see `termination`.
     Solved {
-        /// Termination of the solve: `converged`, `stalled`, `max_iterations` and so on.
+        /// Termination of the solve: `converged`, `stalled`, `stalled_at_jump`, `max_iterations` and so on.
         termination: String,
         /// Finite measures by name.
         measures: IndexMap<String, f64>,
@@ -41,7 +43,7 @@ pub enum TrialOutcome {
 pub struct TrialRecord {
     /// Labels, by column of the experiment.
     pub labels: Vec<String>,
-    /// Fingerprint of the settings; different settings are a different trial.
+    /// Fingerprint of the settings and the input files; with others, it is a different trial.
     pub fingerprint: String,
     /// Outcome of the trial.
     pub outcome: TrialOutcome,
@@ -50,9 +52,10 @@ pub struct TrialRecord {
 }
 
 impl Trial {
-    /// Returns the fingerprint of its [settings](RunSettings::fingerprint).
+    /// Returns the fingerprint of its [settings](RunSettings::fingerprint) and of its input files.
     pub fn fingerprint(&self) -> String {
-        self.settings.fingerprint()
+        let settings = self.settings.fingerprint();
+        if self.inputs == 0 { settings } else { format!("{settings}-{:016x}", self.inputs) }
     }
 
     /// Runs the trial; `None` if the observer stopped it. Errors become the outcome.
@@ -82,8 +85,14 @@ impl Trial {
     }
 }
 
+/// Name of the end at a jump or a kink of the cost, which is as good as a minimum.
+pub(crate) const AT_JUMP: &str = "stalled_at_jump";
+
 /// Returns the name of a termination in documents.
 fn status(termination: &Termination) -> String {
+    if let Termination::Stalled { reason: Stall::Jump } = termination {
+        return AT_JUMP.to_owned();
+    }
     let json = serde_json::to_value(termination).unwrap_or_default();
     json.get("status").and_then(|s| s.as_str()).unwrap_or("unknown").to_owned()
 }

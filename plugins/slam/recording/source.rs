@@ -62,12 +62,12 @@ pub trait SequenceSource: Debug + Send + Sync {
         Ok(None)
     }
 
-    /// Checks that the input files exist, without reading them.
+    /// Returns the input files and folders, without reading them.
     ///
     /// # Errors
     /// The first folder or file that does not exist.
-    fn find_files(&self, _folders: &InputFolders) -> Result<(), SourceError> {
-        Ok(())
+    fn find_files(&self, _folders: &InputFolders) -> Result<Vec<PathBuf>, SourceError> {
+        Ok(vec![])
     }
 
     /// Returns whether the sequence may have an up direction. The settings of a run are checked with it before
@@ -242,6 +242,17 @@ pub enum SourceError {
         /// Number of factors, removed factors and corrected poses.
         changes: usize,
     },
+    /// A frame that is not the one that a journal has for its time.
+    #[error(
+        "the frame at {timestamp} s is not the one in the journal {}: the journal is that of another stream; give a new file",
+        file.display()
+    )]
+    OtherJournal {
+        /// The journal.
+        file: PathBuf,
+        /// Timestamp of the frame. Unit: seconds.
+        timestamp: f64,
+    },
     /// A stream that can be read only once and has been read already.
     #[error("{} can be read once, and another variant has read it: run one variant, or give `file`", file.display())]
     ReadBefore {
@@ -307,23 +318,31 @@ fn paths(tried: &[PathBuf]) -> String {
     tried.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// Checks that a file exists.
+/// Returns the path of a file that exists.
 ///
 /// # Errors
 /// If its metadata cannot be read.
-fn check_file(path: &Path) -> Result<(), SourceError> {
-    match std::fs::metadata(path) {
-        Ok(_) => Ok(()),
-        Err(source) => Err(FormatError::Io { path: path.to_owned(), source }.into()),
+fn found_file(path: PathBuf) -> Result<PathBuf, SourceError> {
+    match std::fs::metadata(&path) {
+        Ok(_) => Ok(path),
+        Err(source) => Err(FormatError::Io { path, source }.into()),
     }
 }
 
-/// Checks that the named files in a folder exist.
+/// Returns the paths of the named files in a folder.
 ///
 /// # Errors
 /// The first file that does not exist.
-fn check_files(folder: &Path, files: &[Option<&Path>]) -> Result<(), SourceError> {
-    files.iter().flatten().try_for_each(|file| check_file(&folder.join(file)))
+fn found_files(folder: &Path, files: &[Option<&Path>]) -> Result<Vec<PathBuf>, SourceError> {
+    files.iter().flatten().map(|file| found_file(folder.join(file))).collect()
+}
+
+/// Files of a data set that are read under these names if they exist and no other is named.
+const USUAL_FILES: [&str; 3] = ["groundtruth.txt", "accelerometer.txt", "objects.json"];
+
+/// Returns the paths of the [`USUAL_FILES`] in a folder.
+fn usual_files(folder: &Path) -> Vec<PathBuf> {
+    USUAL_FILES.iter().map(|name| folder.join(name)).filter(|file| file.is_file()).collect()
 }
 
 #[cfg(test)]

@@ -201,7 +201,7 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// The first folder or file that does not exist.
-    pub fn find_files(&self, variant: &RunVariant) -> Result<(), SourceError> {
+    pub fn find_files(&self, variant: &RunVariant) -> Result<Vec<PathBuf>, SourceError> {
         variant.settings.source.find_files(&self.folders)
     }
 

@@ -82,6 +82,37 @@ fn a_sweep_is_repeated_from_its_folder_alone() {
 }
 
 #[test]
+fn results_from_other_input_files_are_not_taken_over() {
+    let base = "source = { type = 'recorded', folder = 'recording', camera = 'freiburg1' }\n";
+    let sweep = "base = 'base.toml'\nsummary = { metrics = ['ate_se3'], resamples = 10 }\n\
+                 axes = [{ columns = { sigma = 'odometry.noise.sigma' }, rows = [0.01, 0.02] }]\n";
+    let files = folder(&[("desk.toml", BASE), ("base.toml", base), ("sweep.toml", sweep)]);
+    let (recording, out) = (path(&files, "recording"), path(&files, "out"));
+    manifactor(&format!("simulate {} --out {recording}", path(&files, "desk.toml"))).ended(0);
+    let run = || {
+        manifactor(&format!("experiment {} --out {out}", path(&files, "sweep.toml"))).ended(0);
+        (lines_of_log(&out), tables(&out))
+    };
+    let first = run();
+    assert_eq!(run(), first);
+    // one pose is moved
+    let odometry = format!("{recording}/odometry.txt");
+    let text = std::fs::read_to_string(&odometry).unwrap();
+    let line = text.lines().nth(12).unwrap();
+    let mut numbers: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
+    numbers[1] = (numbers[1].parse::<f64>().unwrap() + 0.05).to_string();
+    std::fs::write(&odometry, text.replace(line, &numbers.join(" "))).unwrap();
+    let second = run();
+    assert_eq!(second.0, first.0 + 2, "both trials are run again");
+    assert_ne!(second.1, first.1);
+}
+
+/// Returns the number of lines in the log of an experiment.
+fn lines_of_log(out: &str) -> usize {
+    std::fs::read_to_string(format!("{out}/trials.jsonl")).unwrap().lines().count()
+}
+
+#[test]
 fn a_failed_trial_is_a_row_with_its_reason() {
     let folder = folder(&[("base.toml", BASE), ("sweep.toml", SWEEP)]);
     let out = path(&folder, "out");

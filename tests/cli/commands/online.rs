@@ -248,6 +248,29 @@ fn a_stream_that_is_killed_at_any_moment_goes_on_with_the_same_map() {
     // different settings make a different map
     let ran = fed(&format!("{command} --set online.relinearization_threshold=0.2"), &frames);
     ran.ended(2).complains("is the journal of other settings");
+    // so does another stream with the same times
+    let other = frames.replacen("\"boxes\":[{", "\"boxes\":[{\"score\":0.31,", 1);
+    assert_ne!(other, frames);
+    fed(&command, &other).ended(2).complains("the journal is that of another stream");
+}
+
+/// The noise is estimated in threads of its own, while the thread of the stream waits.
+#[test]
+fn a_stream_on_one_thread_ends_with_the_same_map() {
+    let folder = folder(&[(
+        "desk.toml",
+        &format!("variance_components = {{}}\nassociation = {{ type = \"likelihood\" }}\n{DESK}"),
+    )]);
+    let mapped = |command: &str, threads: usize| {
+        let out = path(&folder, &format!("{command}{threads}"));
+        let ran =
+            manifactor(&format!("{command} {} --out {out} --threads {threads}", path(&folder, "desk.toml")));
+        assert!(ran.code < 2, "{}", ran.stderr);
+        std::fs::read_to_string(format!("{out}/estimate/objects.json")).unwrap()
+    };
+    for command in ["run", "online"] {
+        assert!(mapped(command, 1) == mapped(command, 2), "{command}");
+    }
 }
 
 #[test]

@@ -68,7 +68,7 @@ pub fn trials(data: &[u8]) {
     static TRIAL: LazyLock<Trial> = LazyLock::new(|| {
         let run = Document::parse("run.toml", "source = { type = \"simulated\" }", Format::Toml);
         let run = run.and_then(|document| RunDocument::read(&document)).unwrap_or_else(|e| panic!("{e}"));
-        Trial { labels: vec!["a".to_owned()], settings: run.variants[0].settings.clone() }
+        Trial { labels: vec!["a".to_owned()], settings: run.variants[0].settings.clone(), inputs: 0 }
     });
     let text = String::from_utf8_lossy(data);
     let named = text.replace("FINGERPRINT", &TRIAL.fingerprint());

@@ -4,7 +4,7 @@ use super::interpolation::{InterpolatedFrames, PoseOrImage};
 use super::rectification::Rectification;
 use super::rig::Rig;
 use super::stream::FrameStream;
-use super::{CameraChoice, InputFolders, SequenceSource, SourceError, check_files};
+use super::{CameraChoice, InputFolders, SequenceSource, SourceError, found_files};
 use crate::camera::Cameras;
 use crate::sequence::{Observation, Sequence, SequenceHeader};
 use manifactor_formats::FormatError;
@@ -115,10 +115,10 @@ impl SequenceSource for JsonLines {
         self.open_lines(folders)?.collect()
     }
 
-    fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
+    fn find_files(&self, folders: &InputFolders) -> Result<Vec<PathBuf>, SourceError> {
         let files = [self.file.as_deref(), self.ground_truth.as_deref(), self.camera.file()];
         let others = self.cameras.values().map(|further| further.camera.file());
-        check_files(&folders.document, &files.into_iter().chain(others).collect::<Vec<_>>())
+        found_files(&folders.document, &files.into_iter().chain(others).collect::<Vec<_>>())
     }
 
     fn may_have_up(&self) -> bool {

@@ -5,7 +5,7 @@ use super::camera::CameraChoice;
 use super::extrinsics::Extrinsics;
 use super::rectification::Rectification;
 use super::rig::Rig;
-use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
+use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, found_files};
 use crate::camera::{Cameras, MountedCamera};
 use crate::sequence::{Acceleration, ClassScores, Detection, Sequence, UnusedInput};
 use calibration::camera_of;
@@ -197,14 +197,14 @@ impl SequenceSource for Mcap {
         })
     }
 
-    fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
+    fn find_files(&self, folders: &InputFolders) -> Result<Vec<PathBuf>, SourceError> {
         let further = self.cameras.values().map(|further| &further.camera);
         let cameras = std::iter::once(&self.camera).chain(further);
         let cameras = cameras.map(|camera| camera.as_ref().and_then(CameraChoice::file));
         let others = [Some(self.file.as_path()), self.ground_truth.as_deref()].into_iter().chain(cameras);
         let rows = self.detections_file.iter().flat_map(DetectionsFile::files);
         let files: Vec<_> = others.chain(rows.map(Some)).collect();
-        check_files(&folders.document, &files)
+        found_files(&folders.document, &files)
     }
 
     fn may_have_up(&self) -> bool {

@@ -5,7 +5,7 @@ use super::camera::CameraChoice;
 use super::extrinsics::Extrinsics;
 use super::rectification::Rectification;
 use super::rig::Rig;
-use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
+use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, found_files, usual_files};
 use crate::sequence::Sequence;
 use manifactor_geometry::{Distortion, Se3};
 use manifactor_graph::checked::{NotNegative, Positive, Share};
@@ -138,15 +138,16 @@ impl SequenceSource for RecordedFiles {
         })
     }
 
-    fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
+    fn find_files(&self, folders: &InputFolders) -> Result<Vec<PathBuf>, SourceError> {
         let folder = folders.data_set(&self.folder, "source.folder")?;
         let others = self.cameras.values().flat_map(|further| further.detections.files());
         let named = std::iter::once(self.odometry.as_path()).chain(self.detections.files()).chain(others);
         let files: Vec<_> =
             named.map(Some).chain([self.ground_truth.as_deref(), self.objects.as_deref()]).collect();
-        check_files(&folder, &files)?;
+        let found = found_files(&folder, &files)?;
         let others = self.cameras.values().map(|further| further.camera.file());
-        check_files(&folders.document, &std::iter::once(self.camera.file()).chain(others).collect::<Vec<_>>())
+        let cameras: Vec<_> = std::iter::once(self.camera.file()).chain(others).collect();
+        Ok([found, found_files(&folders.document, &cameras)?, usual_files(&folder)].concat())
     }
 
     fn may_have_up(&self) -> bool {

@@ -2,7 +2,7 @@ use super::assemble::{TimeMatching, default_share, is_default_share, read_ground
 use super::camera::{CameraChoice, by_folder};
 use super::rectification::Rectification;
 use super::rig::Rig;
-use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, check_files};
+use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, found_files, usual_files};
 use crate::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
 use manifactor_geometry::Distortion;
@@ -102,12 +102,13 @@ impl SequenceSource for TumRgbd {
         })
     }
 
-    fn find_files(&self, folders: &InputFolders) -> Result<(), SourceError> {
+    fn find_files(&self, folders: &InputFolders) -> Result<Vec<PathBuf>, SourceError> {
         let folder = folders.data_set(&self.sequence, "source.sequence")?;
         let named = std::iter::once(self.odometry.as_path()).chain(self.detections.files()).map(Some);
         let files: Vec<_> = named.chain([self.ground_truth.as_deref()]).collect();
-        check_files(&folder, &files)?;
-        check_files(&folders.document, &[self.camera.as_ref().and_then(CameraChoice::file)])
+        let found = found_files(&folder, &files)?;
+        let camera = found_files(&folders.document, &[self.camera.as_ref().and_then(CameraChoice::file)])?;
+        Ok([found, camera, usual_files(&folder)].concat())
     }
 
     fn may_have_up(&self) -> bool {
