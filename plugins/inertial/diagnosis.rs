@@ -30,6 +30,8 @@ const MIN_GAIN: f64 = 40.0;
 const MIN_SHARE: f64 = 0.05;
 /// Smallest gain by points that come before the camera, as a share of the cost of those behind it.
 const MIN_BEHIND: f64 = 0.25;
+/// Smallest gain of axes of the accelerometer by gravity alone: odds of 20 to 1 for the best of 23 possible axes, ln 20 + ln 23.
+const MIN_AXES_GAIN: f64 = 6.13;
 /// Minimum number of pairs of images.
 const MIN_PAIRS: usize = 10;
 /// Faults are first judged with every third pair of images, and the best ones again with all.
@@ -377,8 +379,9 @@ impl Recording {
         let judge = |fault: Fault| self.judge(null, 1, fault);
         // the right axes fit a constant gravity better too; one of many others brings points before the camera by chance, if
         // the velocity is not known well
-        let fits_gravity =
-            |judged: &Judged| !matches!(judged.fault, Fault::AccelerometerAxes { .. }) || judged.gain > 0.0;
+        let fits_gravity = |judged: &Judged| {
+            !matches!(judged.fault, Fault::AccelerometerAxes { .. }) || judged.gain > MIN_AXES_GAIN
+        };
         let with_points = |judged: Judged| {
             let corrected = gravity::behind(&self.corrected(&judged.fault), &pairs, &null.rotation);
             (judged.gain + behind.cost - corrected.cost, judged.fault, corrected.points)

@@ -2,7 +2,6 @@
 mod axes;
 mod chart;
 mod distribution;
-mod extent;
 mod image;
 mod intervals;
 mod labels;
@@ -18,12 +17,11 @@ mod viewpoint;
 pub(crate) use axes::{Axes, HEAD, LABELS, NUMBERS, title};
 pub(crate) use chart::{Chart, Curve, TIME, figure};
 pub(crate) use distribution::Distribution;
-pub(crate) use extent::{Extent, Plot};
 pub(crate) use image::{frames_seen, image};
 pub(crate) use intervals::{Intervals, Mean};
 pub(crate) use labels::{Label, place};
 pub(crate) use legend::{Entry, legend};
-pub(crate) use map::map;
+pub(crate) use map::{Extent, Plot, map};
 pub use picture::{NotDrawn, Picture};
 pub(crate) use scale::Scale;
 #[cfg(test)]

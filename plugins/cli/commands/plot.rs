@@ -56,11 +56,11 @@ impl Plot {
     }
 
     fn draw_graph(&self, verbose: u8) -> Result<Status, Failure> {
+        let input = self.reading.open(&self.input, &self.solver)?;
         let Some(out) = &self.out else {
             let help = format!("name a folder: manifactor plot {} --out out/graph", self.input.display());
             return Err(Failure::with_help("the pictures of a graph need --out", help));
         };
-        let input = self.reading.open(&self.input, &self.solver)?;
         for note in &input.notes {
             output::print_note(note);
         }

@@ -21,7 +21,7 @@ use std::time::Instant;
 /// Solve a graph: a literal graph (.toml, .json, .yaml), a pose graph (.g2o, TORO) or bundle adjustment (.bal).
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  manifactor solve examples/03_relations/graph.toml --covariances\n  manifactor solve examples/python/helix.g2o --report out/helix.html"
+    after_help = "Examples:\n  manifactor solve examples/03_relations/graph.toml --covariances\n  manifactor solve examples/python/helix.g2o --report helix.html"
 )]
 pub(crate) struct Solve {
     /// The graph.

@@ -1,6 +1,9 @@
 //! The map, from above or from the side.
+mod extent;
+
+pub(crate) use extent::{Extent, Plot};
+
 use super::axes::{Axes, HEAD, title};
-use super::extent::{Extent, Plot};
 use super::labels::{Label, place};
 use super::legend::{Entry, legend};
 use super::outline::Shape;

@@ -57,7 +57,12 @@ fn kept(bytes: &[u8]) {
         let new: Vec<_> = new.iter().cloned().map(Ok).collect();
         let stream =
             journaled(FrameStream::new(SequenceHeader::new(camera()), new.into_iter()), &path, FINGERPRINT)?;
-        let frames = stream.observations.map(|frame| frame.unwrap_or_else(|e| panic!("{e}")));
+        let frames = stream.observations.filter_map(|frame| match frame {
+            Ok(frame) => Some(frame),
+            // a frame with the time of a recorded one
+            Err(SourceError::OtherJournal { .. }) => None,
+            Err(error) => panic!("{error}"),
+        });
         Ok::<_, manifactor::formats::journal::JournalError>(frames.collect::<Vec<_>>())
     };
     let Ok(before) = read(&[]) else {

@@ -111,15 +111,27 @@ impl PriorMapSettings {
     }
 }
 
+/// Largest angle between the up directions of a map and of a run in it, in radians: a start has an error of its own.
+const MAX_TILT: f64 = 0.26;
+
 impl MapAnchor<'_> {
     /// Returns the frame of the map, for an odometry that begins with the frame `first`. The up direction
-    /// comes from the map, or from `located` if the map has none.
+    /// comes from the map, or from `located` if the map has none. If both have one, and they contradict each other, a
+    /// warning is logged.
     pub fn map_frame(&self, first: &Frame, located: MapFrame) -> MapFrame {
         let map_from_odometry = self.start.compose(&first.world_from_camera.inverse());
         let moved = map_from_odometry.compose(&located.map_from_odometry.inverse());
-        let up =
-            self.map.up.or_else(|| located.up.and_then(|up| Direction::new(moved.rotation.act(&up)).ok()));
-        MapFrame { map_from_odometry, up }
+        let found = located.up.and_then(|up| Direction::new(moved.rotation.act(&up)).ok());
+        if let (Some(map), Some(found)) = (self.map.up, found)
+            && map.angle(&*found) > MAX_TILT
+        {
+            tracing::warn!(
+                "`prior_map.start` turns the up direction of the run by {:.0}° from that of the map: check `start`, `gravity` and \
+                 `up` in the map",
+                map.angle(&*found).to_degrees()
+            );
+        }
+        MapFrame { map_from_odometry, up: self.map.up.or(found) }
     }
 }
 

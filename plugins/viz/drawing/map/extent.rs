@@ -1,6 +1,6 @@
 //! The part of a plane that a map shows, and its place on a sheet.
-use super::axes::Axes;
-use super::scale::Scale;
+use crate::drawing::axes::Axes;
+use crate::drawing::scale::Scale;
 use nalgebra::{Point2, Vector2};
 
 /// Smallest and largest height of the area, as a fraction of the width.
