@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 /// a solve; they replace those of the run, or go to --out.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  manifactor plot examples/python/helix.g2o --out out/helix\n  manifactor plot out/desk --theme dark"
+    after_help = "Examples:\n  manifactor plot examples/python/helix.g2o --out out/helix\n  manifactor run examples/desk/desk.toml --out out/desk\n  manifactor plot out/desk --theme dark"
 )]
 pub(crate) struct Plot {
     /// A graph, or the folder of a run, which holds record.json.
