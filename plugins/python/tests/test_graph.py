@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,23 @@ def test_a_square_closes() -> None:
     assert "converged" in repr(solution) and "<table>" in solution._repr_html_()
     # the graph and its initial values are unchanged
     assert values["x1"].angle == 1.5 and len(graph) == 5
+
+
+def test_a_solution_has_a_page(tmp_path: Path) -> None:
+    graph, values = square()
+    solution = mf.solve(graph, values)
+    assert solution.initial_values == values
+    page = solution.plot("a square")
+    for text in ("<h1>a square</h1>", "4 variables and 5 factors. Converged", "between_se2", '"key":"x2"'):
+        assert text in page.html, text
+    assert "<iframe" in page._repr_html_()
+    page.save_html(tmp_path / "square.html")
+    assert (tmp_path / "square.html").read_text(encoding="utf-8") == page.html
+    with pytest.raises(mf.ManifactorError, match="exists already"):
+        page.save_html(tmp_path / "square.html")
+    # a solution that was pickled has the same page
+    again = pickle.loads(pickle.dumps(solution))
+    assert again.plot("a square").html == page.html and again.initial_values == values
 
 
 def test_many_at_once_are_the_same_as_one_by_one() -> None:
