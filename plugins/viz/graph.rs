@@ -50,6 +50,17 @@ pub(crate) struct GraphLine {
     pub(crate) is_outlier: bool,
 }
 
+/// Returns the weight of a factor: that of its loss times that of the solver.
+pub(crate) fn weight(solution: &Solution, factor: usize) -> f64 {
+    let of_loss = solution.factors.get(factor).map_or(1.0, |state| state.weight);
+    of_loss * solution.weights.get(factor).copied().unwrap_or(1.0)
+}
+
+/// Returns whether the weight of a factor is that of an outlier.
+pub(crate) fn is_outlier(solution: &Solution, factor: usize) -> bool {
+    weight(solution, factor) < OUTLIER
+}
+
 impl GraphScene {
     /// Creates the scene of a graph that was solved from the values `start`.
     pub fn new(title: impl Into<String>, graph: &Graph, start: &Values, solution: &Solution) -> Self {
@@ -82,13 +93,12 @@ impl GraphScene {
             let ends: Vec<usize> =
                 entry.keys.iter().filter_map(|key| index.get(key.as_str()).copied()).collect();
             let state = solution.factors.get(factor)?;
-            let weight = state.weight * solution.weights.get(factor).copied().unwrap_or(1.0);
             (ends.len() > 1).then(|| GraphLine {
                 factor,
                 name: entry.name.as_deref().unwrap_or_else(|| entry.factor.typetag_name()).to_owned(),
                 ends,
                 cost: state.cost,
-                is_outlier: weight < OUTLIER,
+                is_outlier: is_outlier(solution, factor),
             })
         });
         let mut scene = Self { title: title.into(), lines: lines.collect(), points, unplaced };
@@ -149,5 +159,59 @@ impl GraphScene {
     pub(crate) fn left_out(&self) -> Option<String> {
         let n = self.unplaced;
         (n > 0).then(|| format!("{n} variable{} without a position", if n == 1 { "" } else { "s" }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_config::{Document, Format, read_graph};
+    use manifactor_solve::{Gnc, LevenbergMarquardt, Optimizer, Silent, solve};
+
+    /// A chain of poses along x, a rotation that one of them has as well, and a wrong closure of the first and the last.
+    fn scene(poses: usize, more: &str, optimizer: &dyn Optimizer) -> GraphScene {
+        let mut text = String::new();
+        for i in 0..poses {
+            let fixed = i == 0;
+            text += &format!(
+                "[[variables]]\nkey = 'x{i}'\nvalue = {{ type = 'se2', translation = [{i}.1, 0.2], angle = 0.0 }}\nfixed = {fixed}\n"
+            );
+        }
+        for i in 1..poses {
+            let before = i - 1;
+            text += &format!(
+                "[[factors]]\ntype = 'between_se2'\nkeys = ['x{before}', 'x{i}']\nrelative = {{ translation = [1.0, 0.0], angle = 0.0 }}\nnoise = {{ sigma = 0.1 }}\n"
+            );
+        }
+        let document = Document::parse("graph.toml", text + more, Format::Toml).unwrap();
+        let (graph, start) = read_graph(&document).unwrap();
+        let solution = solve(&graph, &start, optimizer, &mut Silent).unwrap();
+        GraphScene::new("graph", &graph, &start, &solution)
+    }
+
+    const TURN: &str = "[[variables]]\nkey = 'r'\nvalue = { type = 'so3', rotation = [0.0, 0.0, 0.0, 1.0] }\n\
+                        [[factors]]\ntype = 'prior_so3'\nkeys = ['r']\nvalue = { rotation = [0.0, 0.0, 0.0, 1.0] }\nnoise = { sigma = 0.1 }\n";
+
+    #[test]
+    fn a_variable_without_a_position_is_drawn_in_a_small_graph_only() {
+        let small = scene(4, TURN, &LevenbergMarquardt::default());
+        assert_eq!((small.points().len(), small.lines().len()), (5, 3));
+        assert!(small.has_names() && small.is_planar() && small.left_out().is_none());
+        assert!(small.points()[0].is_fixed && !small.points()[1].is_fixed);
+        assert!((small.points()[3].after - Vector3::new(3.1, 0.2, 0.0)).norm() < 1e-9);
+        let large = scene(NAMED, TURN, &LevenbergMarquardt::default());
+        assert_eq!(large.points().len(), NAMED);
+        assert_eq!(large.left_out().as_deref(), Some("1 variable without a position"));
+    }
+
+    #[test]
+    fn a_factor_that_the_solver_rejects_is_an_outlier() {
+        let wrong = "[[factors]]\ntype = 'between_se2'\nkeys = ['x0', 'x5']\nrelative = { translation = [0.0, 3.0], angle = 0.0 }\nnoise = { sigma = 0.1 }\n";
+        let outliers = |optimizer: &dyn Optimizer| {
+            let scene = scene(6, wrong, optimizer);
+            scene.lines().iter().filter(|line| line.is_outlier).map(|line| line.factor).collect::<Vec<_>>()
+        };
+        assert_eq!(outliers(&Gnc::default()), [5]);
+        assert!(outliers(&LevenbergMarquardt::default()).is_empty());
     }
 }

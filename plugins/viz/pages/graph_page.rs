@@ -3,7 +3,7 @@ use super::page::{PRINT, Page, VALUES};
 use super::run_page::{WIDTH, version};
 use super::viewer::{self, numbers};
 use crate::canvas::{Ink, Theme};
-use crate::graph::GraphScene;
+use crate::graph::{GraphScene, is_outlier, weight};
 use crate::run::cost;
 use manifactor_graph::{Graph, Values};
 use manifactor_solve::{Outcome, Solution};
@@ -154,11 +154,11 @@ fn by_type(graph: &Graph, solution: &Solution) -> Vec<Vec<String>> {
         outliers: usize,
     }
     let mut sums: BTreeMap<&str, Sum> = BTreeMap::new();
-    for (entry, state) in graph.factors().iter().zip(&solution.factors) {
+    for (i, (entry, state)) in graph.factors().iter().zip(&solution.factors).enumerate() {
         let sum = sums.entry(entry.factor.typetag_name()).or_default();
         sum.factors += 1;
         sum.cost += state.cost;
-        sum.outliers += usize::from(state.weight < 0.5);
+        sum.outliers += usize::from(is_outlier(solution, i));
     }
     let total: f64 = sums.values().map(|sum| sum.cost).sum();
     let mut rows: Vec<_> = sums.into_iter().collect();
@@ -185,7 +185,7 @@ fn worst(graph: &Graph, solution: &Solution) -> Vec<Vec<String>> {
             name.to_owned(),
             keys.join(", "),
             format!("{:.4}", state.cost),
-            format!("{:.3}", state.weight),
+            format!("{:.3}", weight(solution, i)),
             if state.defined { residual.join(" ") } else { "undefined".to_owned() },
         ])
     };
