@@ -180,7 +180,7 @@ mod tests {
         for i in 1..poses {
             let before = i - 1;
             text += &format!(
-                "[[factors]]\ntype = 'between_se2'\nkeys = ['x{before}', 'x{i}']\nrelative = {{ translation = [1.0, 0.0], angle = 0.0 }}\nnoise = {{ sigma = 0.1 }}\n"
+                "[[factors]]\nfactor = {{ type = 'between_se2', relative = {{ translation = [1.0, 0.0], angle = 0.0 }} }}\nkeys = ['x{before}', 'x{i}']\nnoise = {{ sigma = 0.1 }}\n"
             );
         }
         let document = Document::parse("graph.toml", text + more, Format::Toml).unwrap();
@@ -190,7 +190,7 @@ mod tests {
     }
 
     const TURN: &str = "[[variables]]\nkey = 'r'\nvalue = { type = 'so3', rotation = [0.0, 0.0, 0.0, 1.0] }\n\
-                        [[factors]]\ntype = 'prior_so3'\nkeys = ['r']\nvalue = { rotation = [0.0, 0.0, 0.0, 1.0] }\nnoise = { sigma = 0.1 }\n";
+                        [[factors]]\nfactor = { type = 'prior_so3', value = { rotation = [0.0, 0.0, 0.0, 1.0] } }\nkeys = ['r']\nnoise = { sigma = 0.1 }\n";
 
     #[test]
     fn a_variable_without_a_position_is_drawn_in_a_small_graph_only() {
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_factor_that_the_solver_rejects_is_an_outlier() {
-        let wrong = "[[factors]]\ntype = 'between_se2'\nkeys = ['x0', 'x5']\nrelative = { translation = [0.0, 3.0], angle = 0.0 }\nnoise = { sigma = 0.1 }\n";
+        let wrong = "[[factors]]\nfactor = { type = 'between_se2', relative = { translation = [0.0, 3.0], angle = 0.0 } }\nkeys = ['x0', 'x5']\nnoise = { sigma = 0.1 }\n";
         let outliers = |optimizer: &dyn Optimizer| {
             let scene = scene(6, wrong, optimizer);
             scene.lines().iter().filter(|line| line.is_outlier).map(|line| line.factor).collect::<Vec<_>>()
