@@ -73,7 +73,7 @@ impl GraphScene {
             let places = places.filter(|(a, b)| a.iter().chain(b).all(|x| x.is_finite()));
             let (before_at, after_at) = places.unwrap_or_default();
             if places.is_none() {
-                free.push((points.len(), key));
+                free.push(points.len());
                 if !is_small {
                     continue;
                 }
@@ -103,7 +103,7 @@ impl GraphScene {
         });
         let mut scene = Self { title: title.into(), lines: lines.collect(), points, unplaced };
         if is_small {
-            scene.place_beside(&free.into_iter().map(|(i, _)| i).collect::<Vec<_>>());
+            scene.place_beside(&free);
         }
         scene
     }

@@ -1,5 +1,6 @@
 //! Sources of sequences, selected by type in a run's `[source]`.
 use crate::camera::CameraNameError;
+use crate::recording::OBJECTS_FILE;
 use crate::sequence::{ObjectId, Sequence};
 use manifactor_config::Diagnostics;
 use manifactor_formats::FormatError;
@@ -338,7 +339,7 @@ fn found_files(folder: &Path, files: &[Option<&Path>]) -> Result<Vec<PathBuf>, S
 }
 
 /// Files of a data set that are read under these names if they exist and no other is named.
-const USUAL_FILES: [&str; 3] = ["groundtruth.txt", "accelerometer.txt", "objects.json"];
+const USUAL_FILES: [&str; 3] = ["groundtruth.txt", "accelerometer.txt", OBJECTS_FILE];
 
 /// Returns the paths of the [`USUAL_FILES`] in a folder.
 fn usual_files(folder: &Path) -> Vec<PathBuf> {

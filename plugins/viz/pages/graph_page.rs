@@ -21,7 +21,7 @@ const WORST: usize = 20;
 pub struct SolveSummary {
     /// How the solve ended, with its costs.
     pub verdict: String,
-    /// What the user has to know of the estimate.
+    /// Warnings about the estimate.
     pub warnings: Vec<String>,
     /// The initial cost, and the cost after each accepted step.
     pub costs: Vec<f64>,

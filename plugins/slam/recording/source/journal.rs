@@ -1,8 +1,8 @@
 //! Journal of frames on disk, which lets an interrupted stream continue.
 //!
 //! The journal's key is the fingerprint of the settings. Each record is a frame in the format of the source
-//! `json_lines`, with the input of the frame that was not used. Equal frames give equal bits: a program that was killed reads the frames again and arrives
-//! at the same map.
+//! `json_lines`, with the unused input of the frame. Equal frames give equal bits: a program that was killed
+//! reads the frames again and arrives at the same map.
 //!
 //! If a frame cannot be written, for example on a full disk, it is still mapped. The journal ends there, and
 //! the run reports it.
@@ -18,7 +18,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Field of a record with the input that was not used.
+/// Field of a record with the unused input of its frame.
 const UNUSED: &str = "unused_input";
 
 impl JournalRecord for Observation {
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_used_is_told_again() {
+    fn unused_input_is_reported_again_after_a_resume() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("frames.jsonl");
         let with_faults = || {

@@ -106,9 +106,9 @@ impl AssociationHistory {
             .map(|named| named.current_object(names).filter(|name| !self.forgotten.contains(name)))
     }
 
-    /// Gives each true object of the sequence the id of the object that shares its boxes, in the one-to-one matching with
-    /// the most shared boxes: the ids of the association are not those of the source. A true object without a partner
-    /// gets an id that no object has. If the boxes have no objects in the source, the sequence gets a note.
+    /// Gives each true object of the sequence the id of the estimated object with its boxes. Association and source number
+    /// objects independently, so true and estimated objects are matched one to one, with as many shared boxes as possible.
+    /// A true object without a partner gets an unused id. If the source names no objects, the sequence gets a note.
     pub(crate) fn match_true_objects(&self, sequence: &mut Sequence, names: &ObjectIdChanges) {
         let Some(truth) = &mut sequence.ground_truth else { return };
         if truth.objects.is_empty() {
@@ -119,7 +119,8 @@ impl AssociationHistory {
         let is_known = self.boxes.iter().any(|named| named.truth.is_some());
         if !is_known && !self.boxes.is_empty() {
             sequence.unused.push(UnusedInput::Recording(format!(
-                "{} true objects are not compared with the map, because the boxes do not name them; give the boxes the                  ids of the true objects as object_key, which data association does not read",
+                "{} true objects are not compared with the map, because the boxes do not name them; give the boxes the \
+                 ids of the true objects as object_key, which data association does not read",
                 truth.objects.len()
             )));
         }
