@@ -16,7 +16,8 @@
 //! camera that is farthest from it. This does not change the cost. Gauss-Newton requires it. Damped solvers
 //! do not, but report an undetermined direction at the end.
 use crate::error::{FormatError, Mistake, ProblemList};
-use crate::graph_format::{GraphFormat, GraphRead};
+use crate::gauge::{fix_gauge, gauge_note};
+use crate::graph_format::{GraphFormat, GraphRead, GraphText};
 use crate::lines::{Fields, lines, number};
 use crate::text::read_text;
 use crate::words::list;
@@ -25,7 +26,6 @@ use manifactor_graph::{Graph, Key, Values};
 use nalgebra::{Vector2, Vector3};
 use std::path::Path;
 
-mod gauge;
 mod write;
 pub use write::{BalOmissions, format, write};
 
@@ -56,12 +56,7 @@ impl BalReport {
         if !self.unobserved.is_empty() {
             notes.push(format!("nothing observes {}: held", list(self.unobserved.iter())));
         }
-        if !self.anchored.is_empty() {
-            let held = list(self.anchored.iter());
-            notes.push(format!(
-                "nothing fixes the gauge: held pose and scale by {held} (--no-anchor does not)"
-            ));
-        }
+        notes.extend(gauge_note(&self.anchored));
         notes
     }
 }
@@ -69,14 +64,15 @@ impl BalReport {
 crate::register_graph_format!(GraphFormat {
     name: "BAL",
     extensions: &["bal"],
+    folder: None,
     begins: looks_like_bal,
     parse: |text, path, reading| {
         let BalProblem { graph, values, report } = parse(text, path, reading.anchor)?;
         Ok(GraphRead { graph, values, notes: report.notes() })
     },
-    format: Some(|graph, values| {
+    format: Some(|graph, values, _| {
         let (text, omitted) = format(graph, values);
-        (text, omitted.notes())
+        Ok(GraphText::file(text, omitted.notes()))
     }),
 });
 
@@ -196,7 +192,7 @@ fn build(seen: &[Observation], (cameras, points): (&[f64], &[f64]), anchor: bool
         bundle.report.unobserved.push(key.clone());
     }
     if anchor {
-        bundle.report.anchored = gauge::fix_gauge(&mut bundle.graph, &bundle.values);
+        bundle.report.anchored = fix_gauge(&mut bundle.graph, &bundle.values);
     }
     bundle
 }

@@ -1,9 +1,11 @@
 //! Registry of graph file formats by name; each format is one source file.
 //!
 //! ```
-//! use manifactor_formats::{FormatError, GraphFormat, GraphRead, ReadOptions, register_graph_format};
+//! use manifactor_formats::{
+//!     FormatError, GraphFormat, GraphRead, GraphText, ReadOptions, register_graph_format,
+//! };
 //! use manifactor_graph::{Graph, Values};
-//! use std::path::Path;
+//! use std::path::{Path, PathBuf};
 //!
 //! fn parse(text: &str, path: &Path, options: ReadOptions) -> Result<GraphRead, FormatError> {
 //!     # let _ = (text, path, options);
@@ -12,9 +14,10 @@
 //! register_graph_format!(GraphFormat {
 //!     name: "nothing",
 //!     extensions: &["nothing"],
+//!     folder: None,
 //!     begins: |text| text.starts_with("nothing"),
 //!     parse,
-//!     format: Some(|_graph, _values| ("nothing\n".to_owned(), vec![])),
+//!     format: Some(|_graph, _values, _like| Ok(GraphText::file("nothing\n".to_owned(), vec![]))),
 //! });
 //!
 //! fn main() {
@@ -26,7 +29,7 @@ use crate::error::FormatError;
 use manifactor_graph::{Graph, Values};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A file format for graphs, registered with [`register_graph_format!`](crate::register_graph_format).
 #[derive(Debug, Clone, Copy)]
@@ -35,6 +38,8 @@ pub struct GraphFormat {
     pub name: &'static str,
     /// File extensions, in lower case. The first is the default.
     pub extensions: &'static [&'static str],
+    /// Name of the file that is parsed, if a graph is a folder of files. `None` if it is one file.
+    pub folder: Option<&'static str>,
     /// Detects the format from the beginning of a text, for files with an unknown extension.
     pub begins: fn(&str) -> bool,
     /// Parses a text; the path is used only in errors.
@@ -44,9 +49,32 @@ pub struct GraphFormat {
 }
 inventory::collect!(GraphFormat);
 
-/// Writer of a format: returns the text of a graph with its values, and notes about the parts that the format
-/// cannot express.
-pub type GraphWriter = fn(&Graph, &Values) -> (String, Vec<String>);
+/// Writer of a format: returns the text of a graph with its values. The path is that of the file or folder from which
+/// the graph was read, if any: a format can take from it what a graph does not have.
+pub type GraphWriter = fn(&Graph, &Values, Option<&Path>) -> Result<GraphText, FormatError>;
+
+/// A graph as text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GraphText {
+    /// Texts of the files. Each has a name in a folder; `None` for the only file.
+    pub files: Vec<(Option<&'static str>, String)>,
+    /// Notes about the parts that the format cannot express.
+    pub notes: Vec<String>,
+}
+
+impl GraphText {
+    /// Makes the text of a single file.
+    pub fn file(text: String, notes: Vec<String>) -> Self {
+        Self { files: vec![(None, text)], notes }
+    }
+
+    /// Returns the path of each file of a graph at `path`, with its text.
+    pub fn at<'a>(&'a self, path: &'a Path) -> impl Iterator<Item = (PathBuf, &'a str)> {
+        self.files.iter().map(move |(name, text)| {
+            (name.map_or_else(|| path.to_owned(), |name| path.join(name)), text.as_str())
+        })
+    }
+}
 
 /// Options for cases that a file leaves open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,6 +124,22 @@ impl GraphFormat {
     pub fn by_extension(path: &Path) -> Option<&'static Self> {
         let extension = path.extension()?.to_str()?.to_lowercase();
         Self::all().into_iter().find(|format| format.extensions.contains(&extension.as_str()))
+    }
+
+    /// Returns the format of a folder, and the path of the file to parse. `None` if no format has such a file, or if
+    /// `path` is no folder.
+    pub fn of_folder(path: &Path) -> Option<(&'static Self, PathBuf)> {
+        let file = |format: &'static Self| Some((format, path.join(format.folder?)));
+        Self::all().into_iter().filter_map(file).find(|(_, file)| file.is_file())
+    }
+
+    /// Returns the format in which a graph is written to a path: that of its extension, or for a path without one, that
+    /// of a folder.
+    pub fn of_destination(path: &Path) -> Option<&'static Self> {
+        match path.extension() {
+            None => Self::all().into_iter().find(|format| format.folder.is_some()),
+            Some(_) => Self::by_extension(path),
+        }
     }
 
     /// Returns the format with the file's extension, otherwise the format that matches the beginning of the

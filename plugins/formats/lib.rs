@@ -1,4 +1,4 @@
-//! File formats: g2o, TORO, BAL, TUM trajectories, detections, inertial measurements, tables.
+//! File formats: g2o, TORO, BAL, COLMAP, TUM trajectories, detections, inertial measurements, tables.
 //!
 //! No reader skips any content silently. A malformed line is an error with file and line. All errors of a
 //! file are reported together. Content omitted on purpose is counted in a report. Blank lines, `#` comments,
@@ -6,8 +6,10 @@
 // Files are untrusted input: no index is taken for granted.
 #![warn(clippy::indexing_slicing)]
 pub mod bal;
+pub mod colmap;
 pub mod detections;
 mod error;
+mod gauge;
 mod graph_format;
 pub mod inertial;
 mod lines;
@@ -21,7 +23,7 @@ pub mod whole;
 
 pub use error::{BadLine, FormatError, Malformed, Mistake};
 
-pub use graph_format::{GraphFormat, GraphRead, GraphWriter, InformationRepair, ReadOptions};
+pub use graph_format::{GraphFormat, GraphRead, GraphText, GraphWriter, InformationRepair, ReadOptions};
 pub use inertial::accelerometer;
 pub use pose_graph::g2o;
 pub use text::{STDIN, plausible, read_text, words};

@@ -10,7 +10,7 @@
 //! - in each connected part without a `FIX` line, the first pose is held, unless [`PoseGraphOptions::anchor`]
 //!   is false.
 use crate::error::{FormatError, Mistake, ProblemList};
-use crate::graph_format::{GraphFormat, GraphRead, ReadOptions};
+use crate::graph_format::{GraphFormat, GraphRead, GraphText, ReadOptions};
 use crate::lines::lines;
 use crate::text::read_text;
 use crate::words::{count, list};
@@ -36,6 +36,7 @@ use record::Record;
 crate::register_graph_format!(GraphFormat {
     name: "g2o",
     extensions: &["g2o", "toro", "graph"],
+    folder: None,
     begins: |text| lines(text).next().is_some_and(|(_, line)| parser(tag_of(line).0).is_some()),
     parse: |text, path, reading| {
         let ReadOptions { repair, anchor, lenient } = reading;
@@ -43,9 +44,9 @@ crate::register_graph_format!(GraphFormat {
         let PoseGraph { graph, values, report } = parse(text, path, &options)?;
         Ok(GraphRead { graph, values, notes: report.notes() })
     },
-    format: Some(|graph, values| {
+    format: Some(|graph, values, _| {
         let (text, omitted) = g2o::format(graph, values);
-        (text, omitted.notes())
+        Ok(GraphText::file(text, omitted.notes()))
     }),
 });
 

@@ -5,7 +5,7 @@
 //! one.
 #[doc(hidden)]
 pub mod __private {
-    pub use crate::bundle::camera_model::{ProjectionName, rectify};
+    pub use crate::bundle::camera_model::{CameraNames, rectify};
     pub use manifactor_graph;
     pub use nalgebra::Vector2;
 }
@@ -22,8 +22,8 @@ pub mod testing;
 
 pub use bundle::{
     AnyCamera, BalCamera, Camera, CameraError, CameraModel, Distortion, DistortionError, DoubleSphere,
-    ExtendedUnified, InverseDepthProjection, KannalaBrandt, Projection, ProjectionBal, RadialTangential,
-    Stereo,
+    ExtendedUnified, Intrinsics, IntrinsicsOver, InverseDepthProjection, KannalaBrandt, Projection,
+    ProjectionBal, Radial, RadialTangential, Stereo, UncalibratedProjection,
 };
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{

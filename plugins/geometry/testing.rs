@@ -1,5 +1,9 @@
 //! Strategies for rotations, poses and points, including the cases that tend to break formulas.
-use crate::{BalCamera, CameraModel, ImuBias, Point2, Point3, Rn, Se2, Se3, Sim3, So2, So3, Twist, Velocity};
+use crate::{
+    BalCamera, Camera, CameraModel, DoubleSphere, ExtendedUnified, ImuBias, Intrinsics, KannalaBrandt,
+    Point2, Point3, Radial, RadialTangential, Rn, Se2, Se3, Sim3, So2, So3, Twist, Velocity,
+};
+use manifactor_graph::checked::{Positive, Share};
 use manifactor_testing::register_points;
 use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
 use nalgebra::{SVector, Vector1, Vector2, Vector3, Vector6};
@@ -26,6 +30,12 @@ register_points!(Twist, any_twist(), [Twist::zero()]);
 register_points!(Velocity, any_velocity(), [Velocity::zero()]);
 register_points!(ImuBias, any_imu_bias(), [ImuBias::zero()]);
 register_points!(BalCamera, any_bal_camera(), []);
+register_points!(Intrinsics<Camera>, any_pinhole(), []);
+register_points!(Intrinsics<Radial>, any_radial(), []);
+register_points!(Intrinsics<RadialTangential>, any_radial_tangential(), []);
+register_points!(Intrinsics<KannalaBrandt>, any_kannala_brandt(), []);
+register_points!(Intrinsics<DoubleSphere>, any_double_sphere(), []);
+register_points!(Intrinsics<ExtendedUnified>, any_extended_unified(), []);
 
 /// Rotation by π about an axis that is not a coordinate axis.
 fn half_a_turn() -> So3 {
@@ -95,6 +105,49 @@ pub fn any_bal_camera() -> impl Strategy<Value = BalCamera> + Clone {
     let distortion = vector::<2>(0.1);
     (any_se3(), 100.0..2000.0f64, distortion).prop_map(|(world_from_camera, focal_length, distortion)| {
         BalCamera { world_from_camera, focal_length, distortion }
+    })
+}
+
+fn any_camera() -> impl Strategy<Value = Camera> + Clone {
+    ([300.0..900.0f64, 300.0..900.0], [300.0..340.0f64, 220.0..260.0])
+        .prop_map(|([fx, fy], [cx, cy])| Camera { fx, fy, cx, cy, skew: 0.0, width: 640, height: 480 })
+}
+
+/// Intrinsics of a pinhole camera.
+pub fn any_pinhole() -> impl Strategy<Value = Intrinsics<Camera>> + Clone {
+    any_camera().prop_map(Intrinsics)
+}
+
+/// Intrinsics of a camera with some radial distortion.
+pub fn any_radial() -> impl Strategy<Value = Intrinsics<Radial>> + Clone {
+    (any_camera(), vector::<2>(0.1)).prop_filter_map("a camera", |(camera, k)| {
+        let numbers = [camera.fx, camera.cx, camera.cy, k.x, k.y];
+        Radial::new(numbers, camera.width, camera.height).ok().map(Intrinsics)
+    })
+}
+
+/// Intrinsics of a camera with some radial and tangential distortion.
+pub fn any_radial_tangential() -> impl Strategy<Value = Intrinsics<RadialTangential>> + Clone {
+    (any_camera(), vector::<2>(0.1), vector::<2>(0.01))
+        .prop_map(|(camera, k, p)| Intrinsics(RadialTangential::new(camera, [k.x, k.y, p.x, p.y, 0.02])))
+}
+
+/// Intrinsics of a fisheye camera by Kannala and Brandt.
+pub fn any_kannala_brandt() -> impl Strategy<Value = Intrinsics<KannalaBrandt>> + Clone {
+    (any_camera(), vector::<4>(0.02)).prop_map(|(camera, k)| Intrinsics(KannalaBrandt::new(camera, k.into())))
+}
+
+/// Intrinsics of a fisheye camera with two spheres.
+pub fn any_double_sphere() -> impl Strategy<Value = Intrinsics<DoubleSphere>> + Clone {
+    (any_camera(), -0.5..0.5f64, 0.3..0.7f64).prop_filter_map("ξ in its range", |(camera, xi, alpha)| {
+        DoubleSphere::new(camera, xi, Share::literal(alpha)).ok().map(Intrinsics)
+    })
+}
+
+/// Intrinsics of a fisheye camera with an ellipsoid.
+pub fn any_extended_unified() -> impl Strategy<Value = Intrinsics<ExtendedUnified>> + Clone {
+    (any_camera(), 0.3..0.7f64, 0.8..1.2f64).prop_map(|(camera, alpha, beta)| {
+        Intrinsics(ExtendedUnified::new(camera, Share::literal(alpha), Positive::literal(beta)))
     })
 }
 

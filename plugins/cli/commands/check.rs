@@ -56,7 +56,9 @@ impl Check {
         let path = &self.run.config;
         let solver = SolverArguments::set_only(&self.run.set);
         let found = match Content::open(path, kind::CHECKED)? {
-            Content::Graph(text, format) => graph(&self.reading.plain(path, &text, format, &solver)?)?,
+            Content::Graph { text, file, format } => {
+                graph(&self.reading.plain(&file, &text, format, &solver)?)?
+            }
             Content::Document(document) => match InputKind::of_document(&document) {
                 Some(InputKind::Graph) => graph(&graph_file::literal(document, &solver)?)?,
                 Some(InputKind::Experiment) => self.experiment(document)?,

@@ -106,7 +106,7 @@ impl Replay {
         let batch = clock.elapsed().as_secs_f64();
         if self.destination.is_given() {
             let values = finished.as_ref().map_or_else(|| replayed.session.estimates(), |f| f.values.clone());
-            self.destination.write(&replayed.session.graph().0, &values)?;
+            self.destination.write(&replayed.session.graph().0, &values, &self.graph)?;
         }
         if let Some(folder) = &self.plot {
             let title = format!("{}: latency of each update", self.graph.display());

@@ -18,7 +18,8 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Solve a graph: a literal graph (.toml, .json, .yaml), a pose graph (.g2o, TORO) or bundle adjustment (.bal).
+/// Solve a graph: a literal graph (.toml, .json, .yaml), a pose graph (.g2o, TORO) or bundle adjustment (.bal, or the
+/// folder of a COLMAP model).
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  manifactor solve examples/03_relations/graph.toml --covariances\n  manifactor solve examples/python/helix.g2o --report helix.html"
@@ -69,7 +70,7 @@ impl Solve {
         let solution = solve(&input.graph, &values, &*input.optimizer, &mut observer);
         let solution = solution.map_err(Failure::input)?;
         drop(watch);
-        self.destination.write(&input.graph, &solution.values)?;
+        self.destination.write(&input.graph, &solution.values, &self.graph)?;
         if let Some(page) = &self.report {
             let title = graph_file::title(&self.graph);
             let summary = SolveSummary::new(&solution.outcome);

@@ -4,7 +4,7 @@ use crate::output;
 use clap::{ArgGroup, Args};
 use manifactor::config::{Format, write_graph};
 use manifactor::formats::whole::{check_writable, write_whole};
-use manifactor::formats::{GraphFormat, GraphWriter};
+use manifactor::formats::{GraphFormat, GraphText, GraphWriter};
 use manifactor::graph::{Graph, Values};
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("written").multiple(true))]
 pub(crate) struct Destination {
-    /// Write the graph with the estimate to this file; the extension selects the format.
+    /// Write the graph with the estimate to this file; the extension selects the format. A name without an extension is
+    /// a folder for a model of COLMAP.
     #[arg(long, short, value_name = "FILE", group = "written")]
     out: Option<PathBuf>,
     /// Overwrite an existing file.
@@ -24,13 +25,23 @@ impl Destination {
     /// Returns an error if the graph of `input` cannot be written to this file. Called before the solve.
     pub(crate) fn check(&self, input: &Path) -> Result<(), Failure> {
         let Some(path) = &self.out else { return Ok(()) };
-        if Format::of_path(path).is_none() && writer(path).is_none() {
-            return Err(no_format(path));
+        let format = GraphFormat::of_destination(path).filter(|format| format.format.is_some());
+        if Format::of_path(path).is_some() || format.is_some_and(|format| format.folder.is_none()) {
+            if !self.force {
+                refuse_to_replace(path, input, "is the input graph, and its comments would be lost")?;
+            }
+            return check_writable(path).map_err(Failure::at(path));
         }
-        if !self.force {
-            refuse_to_replace(path, input, "is the input graph, and its comments would be lost")?;
+        let main = format.and_then(|format| format.folder).ok_or_else(|| no_format(path))?;
+        if !self.force && path.join(main).exists() {
+            let what = format!("{} has a model already", path.display());
+            return Err(Failure::with_help(what, "choose another name, or overwrite it with --force"));
         }
-        check_writable(path).map_err(Failure::at(path))
+        if path.exists() && !path.is_dir() {
+            let what = format!("{} is a file; expected a folder for a model of COLMAP", path.display());
+            return Err(Failure::with_help(what, "choose another name"));
+        }
+        Ok(())
     }
 
     /// Returns an error if a further file cannot be written. Called before the solve.
@@ -47,16 +58,23 @@ impl Destination {
     }
 
     /// Writes a graph with these values if an output file is given, and reports everything that the format
-    /// cannot express.
-    pub(crate) fn write(&self, graph: &Graph, values: &Values) -> Result<(), Failure> {
+    /// cannot express. `input` is the path from which the graph was read.
+    pub(crate) fn write(&self, graph: &Graph, values: &Values, input: &Path) -> Result<(), Failure> {
         let Some(path) = &self.out else { return Ok(()) };
-        let (text, notes) = match (Format::of_path(path), writer(path)) {
-            (Some(format), _) => (write_graph(graph, values, format).map_err(Failure::input)?, Vec::new()),
-            (None, Some(writer)) => writer(graph, values),
+        let written = match (Format::of_path(path), writer(path)) {
+            (Some(format), _) => {
+                GraphText::file(write_graph(graph, values, format).map_err(Failure::input)?, vec![])
+            }
+            (None, Some(writer)) => writer(graph, values, Some(input))?,
             (None, None) => return Err(no_format(path)),
         };
-        write_whole(path, text.as_bytes()).map_err(Failure::at(path))?;
-        notes.iter().for_each(|note| output::print_note(note));
+        for (file, text) in written.at(path) {
+            if file != *path {
+                std::fs::create_dir_all(path).map_err(Failure::at(path))?;
+            }
+            write_whole(&file, text.as_bytes()).map_err(Failure::at(&file))?;
+        }
+        written.notes.iter().for_each(|note| output::print_note(note));
         Ok(())
     }
 }
@@ -78,7 +96,7 @@ pub(crate) fn refuse_to_replace(path: &Path, input: &Path, is_input: &str) -> Re
 
 /// The writer for the extension of `path`, if its format is not a document.
 fn writer(path: &Path) -> Option<GraphWriter> {
-    GraphFormat::by_extension(path)?.format
+    GraphFormat::of_destination(path)?.format
 }
 
 fn no_format(path: &Path) -> Failure {
@@ -90,6 +108,6 @@ fn no_format(path: &Path) -> Failure {
     let last = extensions.pop().unwrap_or_default();
     Failure::with_help(
         format!("{}: graphs cannot be written in a format with this extension", path.display()),
-        format!("use {} or {last}", extensions.join(", ")),
+        format!("use {} or {last}, or for a model of COLMAP the name of a folder", extensions.join(", ")),
     )
 }

@@ -3,20 +3,31 @@ use crate::failure::Failure;
 use crate::input::kind::{Expected, InputKind};
 use manifactor::config::{Diagnostics, Document, Format};
 use manifactor::formats::{GraphFormat, STDIN, read_text};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Content of a file.
 pub(crate) enum Content {
     /// A document in TOML, JSON or YAML.
     Document(Document),
     /// A graph in one of the other formats.
-    Graph(String, &'static GraphFormat),
+    Graph {
+        /// The text of its file.
+        text: String,
+        /// Path of the file; in a folder, that of its main file.
+        file: PathBuf,
+        /// The format.
+        format: &'static GraphFormat,
+    },
 }
 
 impl Content {
     /// Reads a file. Its format follows from the extension, or else from the first characters. A file of a
     /// kind that is not expected is an error that names the command for it.
     pub(crate) fn open(path: &Path, expected: Expected) -> Result<Self, Failure> {
+        if let Some((format, file)) = GraphFormat::of_folder(path) {
+            expected.check(path, Some(InputKind::GraphText))?;
+            return Ok(Self::Graph { text: read_text(&file)?, file, format });
+        }
         expected.refuse_folder(path)?;
         expected.check(path, InputKind::of_path(path))?;
         if Format::of_path(path).is_some() {
@@ -28,7 +39,7 @@ impl Content {
         let text = read_text(path)?;
         expected.check(path, InputKind::of_text(path, &text))?;
         match GraphFormat::detect(path, &text) {
-            Some(format) => Ok(Self::Graph(text, format)),
+            Some(format) => Ok(Self::Graph { text, file: path.to_owned(), format }),
             None if path == Path::new(STDIN) => {
                 let document = parse(text)?;
                 expected.check(path, InputKind::of_document(&document))?;
@@ -45,7 +56,7 @@ impl Content {
 pub(crate) fn open(path: &Path, expected: Expected) -> Result<Document, Failure> {
     match Content::open(path, expected)? {
         Content::Document(document) => Ok(document),
-        Content::Graph(..) => Err(unknown_format(path)),
+        Content::Graph { .. } => Err(unknown_format(path)),
     }
 }
 

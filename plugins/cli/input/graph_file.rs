@@ -1,5 +1,6 @@
 //! Graphs in files, by extension.
 use crate::failure::Failure;
+use crate::input::choice::choose;
 use crate::input::document::Content;
 use crate::input::kind;
 use crate::input::solver::SolverArguments;
@@ -7,12 +8,14 @@ use crate::output::text::{count, on_one_line};
 use clap::{Args, ValueEnum};
 use manifactor::config::{Definitions, Document, Errors, Format, graph_root, read_graph_section};
 use manifactor::formats::{self, GraphFormat, GraphRead, InformationRepair};
+use manifactor::graph::loss::Loss;
 use manifactor::graph::{Graph, Values};
 use manifactor::smoother::SmootherSettings as Online;
 use manifactor::solve::{Bytes, Optimizer, Start, available_memory, memory_limit};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Options for reading a graph that is not a document.
 #[derive(Debug, Args)]
@@ -26,6 +29,10 @@ pub(crate) struct Reading {
     /// Skip lines with unknown tags and report them; by default they are an error.
     #[arg(long)]
     lenient: bool,
+    /// Give every factor this robust loss, one of `manifactor list losses`; `--set loss.scale=2.0` sets its scale. In a
+    /// document, each factor has its own.
+    #[arg(long, value_name = "NAME")]
+    loss: Option<String>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -55,12 +62,16 @@ impl Reading {
     pub(crate) fn open(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
         check_memory(path)?;
         match Content::open(path, kind::GRAPH)? {
+            Content::Document(_) if self.loss.is_some() => Err(Failure::with_help(
+                "--loss: a document gives each factor its own loss",
+                "write `loss = { type = \"cauchy\" }` in the tables of its factors",
+            )),
             Content::Document(document) => literal(document, solver),
-            Content::Graph(text, format) => self.plain(path, &text, format, solver),
+            Content::Graph { text, file, format } => self.plain(&file, &text, format, solver),
         }
     }
 
-    /// Reads a file in a registered format. `--set` can only set its solver, its start and `online`.
+    /// Reads a file in a registered format. `--set` can only set its solver, its start, its loss and `online`.
     pub(crate) fn plain(
         &self,
         path: &Path,
@@ -75,11 +86,19 @@ impl Reading {
             let optimizer = solver.read_solver(&mut section, settings.source());
             let start = solver.read_start(&mut section, settings.source());
             let online = section.optional("online").unwrap_or_default();
+            let loss = self.loss.as_deref().map(|name| {
+                choose::<dyn Loss>(&mut section, "loss", ("--loss", Some(name)), name, settings.source())
+            });
             section.finish();
-            Some((optimizer?, start?, online))
+            Some((optimizer?, start?, online, loss.map_or(Some(None), |loss| loss.map(Some))?))
         });
-        let (optimizer, start, online) = errors.finish(chosen)?;
-        let GraphRead { graph, values, notes } = (format.parse)(text, path, self.choices())?;
+        let (optimizer, start, online, loss) = errors.finish(chosen)?;
+        let GraphRead { mut graph, values, mut notes } = (format.parse)(text, path, self.choices())?;
+        if let Some(loss) = loss {
+            let loss: Arc<dyn Loss> = loss.into();
+            notes.push(format!("every factor has the loss {}", loss.typetag_name()));
+            graph.factors_mut().iter_mut().for_each(|entry| entry.loss = Some(loss.clone()));
+        }
         Ok(GraphFile { graph, values, optimizer, start, online, notes })
     }
 

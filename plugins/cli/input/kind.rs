@@ -85,6 +85,7 @@ impl InputKind {
         match () {
             () if has("record.json") => Some(Self::RunFolder),
             () if has("graph.json") => Some(Self::VariantFolder),
+            () if GraphFormat::of_folder(folder).is_some() => Some(Self::GraphText),
             () if has("odometry.txt") || has("detections.csv") => Some(Self::Recording),
             () => None,
         }

@@ -4,7 +4,7 @@ use manifactor_graph::{Fixed, Graph, Key, Values};
 /// Returns the first pose of each connected part without a held variable or a measurement in the world frame.
 /// For a part without a pose, its first variable.
 pub(crate) fn anchors(graph: &Graph, values: &Values, is_pose: impl Fn(&Key) -> bool) -> Vec<Key> {
-    let mut parts = ConnectedSets::connected(graph, values);
+    let mut parts = ConnectedSets::connected(graph, values, |_| true);
     let place = |key: &Key| values.position(key.as_str());
     let mut held = vec![false; values.len()];
     let whole = graph.fixed().iter().filter(|(_, fixed)| **fixed == Fixed::Whole(true));
@@ -30,11 +30,12 @@ pub(crate) fn anchors(graph: &Graph, values: &Values, is_pose: impl Fn(&Key) -> 
 pub(crate) struct ConnectedSets(Vec<usize>);
 
 impl ConnectedSets {
-    /// Returns the connected sets of variables, by their index.
-    pub(crate) fn connected(graph: &Graph, values: &Values) -> Self {
+    /// Returns the connected sets of variables, by their index; a variable that does not connect is a set of its own.
+    pub(crate) fn connected(graph: &Graph, values: &Values, connects: impl Fn(&Key) -> bool) -> Self {
         let mut parts = Self((0..values.len()).collect());
         for factor in graph.factors() {
-            let places = factor.keys.iter().filter_map(|key| values.position(key.as_str()));
+            let connecting = factor.keys.iter().filter(|key| connects(key));
+            let places = connecting.filter_map(|key| values.position(key.as_str()));
             let places: Vec<usize> = places.collect();
             places.windows(2).for_each(|pair| parts.join(pair[0], pair[1]));
         }

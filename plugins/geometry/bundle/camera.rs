@@ -1,7 +1,7 @@
 //! Pinhole cameras without distortion.
 use crate::{CameraModel, Se3, register_camera};
 use manifactor_graph::Scalar;
-use nalgebra::{Matrix2x3, Matrix3, Matrix3x4, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, Matrix3x4, U4, Vector2, Vector3, Vector4};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -124,10 +124,29 @@ impl CameraModel for Camera {
     const EXAMPLE: &'static str =
         "{ fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
 
+    type Dim = U4;
+    const INTRINSICS: &'static [&'static str] = &["fx", "fy", "cx", "cy"];
+
     #[inline(always)]
-    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+    fn intrinsics(&self) -> Vector4<f64> {
+        Vector4::new(self.fx, self.fy, self.cx, self.cy)
+    }
+
+    fn with_intrinsics(&self, intrinsics: &Vector4<f64>) -> Self {
+        let [fx, fy, cx, cy] = (*intrinsics).into();
+        Self { fx, fy, cx, cy, ..*self }
+    }
+
+    #[inline(always)]
+    fn is_valid(&self) -> bool {
+        self.fx > 0.0 && self.fy > 0.0
+    }
+
+    #[inline(always)]
+    fn project_with<T: Scalar>(&self, intrinsics: &Vector4<T>, point: &Vector3<T>) -> Vector2<T> {
         let (x, y) = (point.x / point.z, point.y / point.z);
-        Vector2::new(x * self.fx + y * self.skew + T::from(self.cx), y * self.fy + T::from(self.cy))
+        let [fx, fy, cx, cy] = (*intrinsics).into();
+        Vector2::new(x * fx + y * self.skew + cx, y * fy + cy)
     }
 
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
@@ -151,7 +170,7 @@ impl CameraModel for Camera {
     }
 }
 
-register_camera!("pinhole", "projection", Camera);
+register_camera!("pinhole", "projection", "uncalibrated_pinhole", Camera);
 
 impl TryFrom<Document> for Camera {
     type Error = CameraError;

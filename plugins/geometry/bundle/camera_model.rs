@@ -1,7 +1,7 @@
 //! Interface of camera models: a model is one file that implements [`CameraModel`] and ends with
 //! `register_camera!`.
 use crate::{Camera, Point3};
-use manifactor_graph::{Jet, JetOf, Manifold, Scalar};
+use manifactor_graph::{Dimension, Jet, JetOf, Manifold, Scalar, Vector};
 use nalgebra::{Matrix2x3, U3, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -17,8 +17,31 @@ pub trait CameraModel:
     /// A camera in the inline TOML form used inside a factor; an example for the catalogue.
     const EXAMPLE: &'static str;
 
+    /// Number of intrinsics that can be estimated.
+    type Dim: Dimension;
+
+    /// Names of these intrinsics, in the order of [`intrinsics`](Self::intrinsics).
+    const INTRINSICS: &'static [&'static str];
+
+    /// Returns the intrinsics that can be estimated: focal lengths, principal point, then the lens.
+    fn intrinsics(&self) -> Vector<Self::Dim>;
+
+    /// Returns the same camera with other intrinsics. A camera with [invalid](Self::is_valid) ones sees nothing.
+    #[must_use]
+    fn with_intrinsics(&self, intrinsics: &Vector<Self::Dim>) -> Self;
+
+    /// Returns whether the intrinsics are those of a camera: for example, focal lengths above zero.
+    fn is_valid(&self) -> bool;
+
+    /// Returns the pixel of a point that the camera [sees](Self::sees), with other intrinsics.
+    fn project_with<T: Scalar>(&self, intrinsics: &Vector<Self::Dim, T>, point: &Vector3<T>) -> Vector2<T>;
+
     /// Returns the pixel of a point that the camera [sees](Self::sees).
-    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T>;
+    #[inline(always)]
+    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+        let intrinsics = self.intrinsics();
+        self.project_with(&Self::Dim::vector(|i| T::from(intrinsics.as_ref()[i])), point)
+    }
 
     /// Returns a direction that projects to the pixel, of any length, or `None` if the model has none.
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>>;
@@ -57,12 +80,15 @@ pub trait AnyCamera: Debug + Send + Sync {
 
 manifactor_graph::kind!(dyn AnyCamera, "camera");
 
-/// Name of a model's [`Projection`](crate::Projection) factor in documents. Implemented by
-/// [`register_camera!`](crate::register_camera).
+/// Names of a model in documents. Implemented by [`register_camera!`](crate::register_camera).
 #[doc(hidden)]
-pub trait ProjectionName {
-    /// The name.
+pub trait CameraNames {
+    /// Name of the model, as a camera and as a variable.
+    const MODEL: &'static str;
+    /// Name of its [`Projection`](crate::Projection) factor.
     const PROJECTION: &'static str;
+    /// Name of its [`UncalibratedProjection`](crate::UncalibratedProjection) factor.
+    const UNCALIBRATED: &'static str;
 }
 
 /// Cosine of the largest angle to the optical axis in the rectified image, 70°. There, a pixel of a fisheye camera
@@ -112,13 +138,16 @@ macro_rules! camera_document {
 }
 pub(crate) use camera_document;
 
-/// Registers a [`CameraModel`](crate::CameraModel) as a camera for sources, and its point projection as a
-/// factor: `register_camera!("radial_tangential", "projection_radial_tangential", RadialTangential);`
+/// Registers a [`CameraModel`](crate::CameraModel): as a camera for sources, as a variable, and its point projection
+/// as two factors, of a calibrated and of an uncalibrated camera:
+/// `register_camera!("radial", "projection_radial", "uncalibrated_radial", Radial);`
 #[macro_export]
 macro_rules! register_camera {
-    ($name:literal, $projection:literal, $type:ty) => {
-        impl $crate::__private::ProjectionName for $type {
+    ($name:literal, $projection:literal, $uncalibrated:literal, $type:ty) => {
+        impl $crate::__private::CameraNames for $type {
+            const MODEL: &'static str = $name;
             const PROJECTION: &'static str = $projection;
+            const UNCALIBRATED: &'static str = $uncalibrated;
         }
         const _: () = {
             use $crate::__private::manifactor_graph::__private::typetag;
@@ -136,6 +165,11 @@ macro_rules! register_camera {
             }
             $crate::__private::manifactor_graph::register!(dyn $crate::AnyCamera, $name, $type);
         };
+        $crate::__private::manifactor_graph::register_manifold!($name, $crate::Intrinsics<$type>);
         $crate::__private::manifactor_graph::register_factor!($projection, $crate::Projection<$type>);
+        $crate::__private::manifactor_graph::register_factor!(
+            $uncalibrated,
+            $crate::UncalibratedProjection<$type>
+        );
     };
 }

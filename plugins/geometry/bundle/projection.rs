@@ -1,5 +1,5 @@
 //! Projection of a point into a calibrated camera.
-use crate::bundle::camera_model::ProjectionName;
+use crate::bundle::camera_model::CameraNames;
 use crate::{Camera, CameraModel, Coordinates, Point3, Se3};
 use manifactor_graph::prelude::*;
 use nalgebra::SMatrix;
@@ -9,7 +9,7 @@ use nalgebra::SMatrix;
 /// With `body_from_camera`, the variable is the pose of a body on which the camera is mounted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, bound = "M: CameraModel")]
-#[schemars(bound = "M: CameraModel + ProjectionName", description = description::<M>())]
+#[schemars(bound = "M: CameraModel + CameraNames", description = description::<M>())]
 pub struct Projection<M = Camera> {
     /// Measured pixel, x right and y down.
     pub pixel: Coordinates<2>,
@@ -20,7 +20,7 @@ pub struct Projection<M = Camera> {
     pub body_from_camera: Option<Se3>,
 }
 
-fn description<M: CameraModel + ProjectionName>() -> String {
+fn description<M: CameraModel + CameraNames>() -> String {
     format!(
         "The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.\n\nVariables: the pose of the camera, from its own frame (z \
          forward) to the world's, and the point. With `body_from_camera`, the pose is that of a body on which the camera is \
@@ -73,7 +73,8 @@ impl<M: CameraModel> Residual for Projection<M> {
     ) -> Vector2<f64> {
         let mounting = self.body_from_camera.as_ref();
         let seen = seen(pose, point, mounting);
-        derive(self.camera.derivative(&seen), (pose, point), mounting, jacobians);
+        let (by_pose, by_point) = jacobians;
+        derive(self.camera.derivative(&seen), (pose, point), mounting, by_pose, by_point);
         self.camera.project(&seen) - *self.pixel
     }
 }
@@ -85,7 +86,8 @@ pub(super) fn derive<const ROWS: usize>(
     mut by_local: SMatrix<f64, ROWS, 3>,
     (pose, point): (&Se3, &Vector3<f64>),
     mounting: Option<&Se3>,
-    (by_pose, by_point): &mut (SMatrix<f64, ROWS, 6>, SMatrix<f64, ROWS, 3>),
+    by_pose: &mut SMatrix<f64, ROWS, 6>,
+    by_point: &mut SMatrix<f64, ROWS, 3>,
 ) {
     let local = pose.inverse_act(point);
     if let Some(mounting) = mounting {

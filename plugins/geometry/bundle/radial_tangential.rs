@@ -2,7 +2,7 @@
 use crate::bundle::camera_model::camera_document;
 use crate::{Camera, CameraError, CameraModel, Point2, register_camera};
 use manifactor_graph::{Jet, JetOf, Manifold, Scalar};
-use nalgebra::{Matrix2, U2, Vector2, Vector3};
+use nalgebra::{Matrix2, SVector, U2, U8, Vector2, Vector3, Vector4};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// (1 + k₄ r² + k₅ r⁴ + k₆ r⁶) plus the tangential part (2 p₁ xy/z² + p₂ (r² + 2 x²/z²), p₁ (r² + 2 y²/z²) + 2 p₂
 /// xy/z²); Brown, *Close-range camera calibration*, 1971, and OpenCV for the denominator. It is `plumb_bob` and
 /// `rational_polynomial` of ROS, `radtan` of Kalibr, and `OPENCV` of COLMAP. The model folds back beyond some radius;
-/// points beyond that radius are not seen.
+/// points beyond that radius are not seen. As a variable, k₃ to k₆ are constants.
 ///
 /// ```toml
 /// [source]
@@ -64,6 +64,14 @@ impl TryFrom<Vec<f64>> for Distortion {
     }
 }
 
+impl Distortion {
+    /// Returns the coefficients k₃ to k₆; those that were not given are 0.
+    pub fn further(&self) -> [f64; 4] {
+        let [.., k3, k4, k5, k6] = self.coefficients;
+        [k3, k4, k5, k6]
+    }
+}
+
 impl From<Distortion> for Vec<f64> {
     fn from(distortion: Distortion) -> Self {
         distortion.coefficients[..distortion.given].to_vec()
@@ -87,13 +95,24 @@ impl RadialTangential {
         Self { pinhole, distortion, limit: fold_limit(&distortion) }
     }
 
+    /// Returns the coefficients.
+    pub fn distortion(&self) -> Distortion {
+        self.distortion
+    }
+
     /// Applies the distortion to the point (x/z, y/z), in units of the focal length from the principal point.
     #[inline(always)]
-    fn distort<T: Scalar>(&self, [x, y]: [T; 2]) -> [T; 2] {
-        let [_, _, p1, p2, ..] = self.distortion.coefficients.map(T::from);
+    fn distort<T: Scalar>(&self, point: [T; 2]) -> [T; 2] {
+        let [k1, k2, p1, p2, ..] = self.distortion.coefficients.map(T::from);
+        self.distort_with([k1, k2, p1, p2], point)
+    }
+
+    /// Works like [`distort`](Self::distort), with other coefficients k₁, k₂, p₁, p₂.
+    #[inline(always)]
+    fn distort_with<T: Scalar>(&self, [k1, k2, p1, p2]: [T; 4], [x, y]: [T; 2]) -> [T; 2] {
         let two = T::from(2.0);
         let r2 = x * x + y * y;
-        let radial = self.distortion.radial(r2);
+        let radial = self.distortion.radial([k1, k2], r2);
         let sideways = two * p1 * x * y + p2 * (r2 + two * x * x);
         let upward = p1 * (r2 + two * y * y) + two * p2 * x * y;
         [x * radial + sideways, y * radial + upward]
@@ -101,10 +120,10 @@ impl RadialTangential {
 }
 
 impl Distortion {
-    /// Returns the radial factor at the squared radius.
+    /// Returns the radial factor at the squared radius, with other coefficients k₁ and k₂.
     #[inline(always)]
-    fn radial<T: Scalar>(&self, r2: T) -> T {
-        let [k1, k2, _, _, k3, k4, k5, k6] = self.coefficients.map(T::from);
+    fn radial<T: Scalar>(&self, [k1, k2]: [T; 2], r2: T) -> T {
+        let [_, _, _, _, k3, k4, k5, k6] = self.coefficients.map(T::from);
         let one = T::from(1.0);
         let numerator = one + r2 * (k1 + r2 * (k2 + r2 * k3));
         if self.given <= 5 {
@@ -121,6 +140,9 @@ const FOLD_BISECTIONS: usize = 60;
 /// Returns the smallest s = r² > 0 at which r times the radial factor stops growing with r, or has a pole; infinite
 /// if there is none.
 fn fold_limit(Distortion { coefficients: [k1, k2, _, _, k3, k4, k5, k6], .. }: &Distortion) -> f64 {
+    if [k3, k4, k5, k6].into_iter().all(|k| *k == 0.0) {
+        return smallest_root(3.0 * k1, 5.0 * k2);
+    }
     // with t = 1/s: numerator t³ N = t³ + k₁ t² + k₂ t + k₃, denominator t³ D in the same way; r N/D grows with r if
     // N D + 2 s (N' D - N D') is positive, here times t⁶
     let polynomial = |t: f64, [a, b, c]: [f64; 3]| t * (t * (t + a) + b) + c;
@@ -145,14 +167,49 @@ fn fold_limit(Distortion { coefficients: [k1, k2, _, _, k3, k4, k5, k6], .. }: &
     1.0 / high
 }
 
+/// Returns the smallest s > 0 with 1 + a s + b s² = 0; infinite if there is none.
+pub(super) fn smallest_root(a: f64, b: f64) -> f64 {
+    let discriminant = a * a - 4.0 * b;
+    // 1/s is the larger root of t² + a t + b; each branch adds numbers of one sign
+    let largest = match () {
+        () if discriminant < 0.0 => return f64::INFINITY,
+        () if a <= 0.0 => 0.5 * (discriminant.sqrt() - a),
+        () => -2.0 * b / (a + discriminant.sqrt()),
+    };
+    if largest > 0.0 { largest.recip() } else { f64::INFINITY }
+}
+
 impl CameraModel for RadialTangential {
     const EXAMPLE: &'static str = "{ fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480, \
                                    distortion = [0.1, 0.02, 0.0, 0.0, 0.0] }";
 
+    type Dim = U8;
+    const INTRINSICS: &'static [&'static str] = &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"];
+
     #[inline(always)]
-    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
-        let [x, y] = self.distort([point.x / point.z, point.y / point.z]);
-        self.pinhole.project(&Vector3::new(x, y, T::from(1.0)))
+    fn intrinsics(&self) -> SVector<f64, 8> {
+        let Camera { fx, fy, cx, cy, .. } = self.pinhole;
+        let [k1, k2, p1, p2, ..] = self.distortion.coefficients;
+        SVector::from([fx, fy, cx, cy, k1, k2, p1, p2])
+    }
+
+    fn with_intrinsics(&self, intrinsics: &SVector<f64, 8>) -> Self {
+        let [fx, fy, cx, cy, lens @ ..]: [f64; 8] = (*intrinsics).into();
+        let mut distortion = self.distortion;
+        distortion.coefficients.iter_mut().zip(lens).for_each(|(k, new)| *k = new);
+        Self::new(Camera { fx, fy, cx, cy, ..self.pinhole }, distortion)
+    }
+
+    #[inline(always)]
+    fn is_valid(&self) -> bool {
+        self.pinhole.is_valid()
+    }
+
+    #[inline(always)]
+    fn project_with<T: Scalar>(&self, intrinsics: &SVector<T, 8>, point: &Vector3<T>) -> Vector2<T> {
+        let [fx, fy, cx, cy, k1, k2, p1, p2] = (*intrinsics).into();
+        let [x, y] = self.distort_with([k1, k2, p1, p2], [point.x / point.z, point.y / point.z]);
+        self.pinhole.project_with(&Vector4::new(fx, fy, cx, cy), &Vector3::new(x, y, T::from(1.0)))
     }
 
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
@@ -201,7 +258,12 @@ impl CameraModel for RadialTangential {
     }
 }
 
-register_camera!("radial_tangential", "projection_radial_tangential", RadialTangential);
+register_camera!(
+    "radial_tangential",
+    "projection_radial_tangential",
+    "uncalibrated_radial_tangential",
+    RadialTangential
+);
 
 impl TryFrom<Document> for RadialTangential {
     type Error = CameraError;

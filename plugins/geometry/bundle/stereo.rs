@@ -71,7 +71,8 @@ impl Residual for Stereo {
         let mut by_seen = left.fixed_resize::<3, 3>(0.0);
         by_seen.set_row(2, &left.row(0));
         by_seen[(2, 2)] += self.camera.fx * self.baseline.get() / (q.z * q.z);
-        derive(by_seen, (pose, point), mounting, jacobians);
+        let (by_pose, by_point) = jacobians;
+        derive(by_seen, (pose, point), mounting, by_pose, by_point);
         self.residual::<f64>((*pose, **point))
     }
 }

@@ -35,29 +35,41 @@ fn document_in(py: Python<'_>, graph: &InnerGraph, values: &InnerValues, format:
     if found.is_empty() { Ok(text) } else { Err(misfit(&found)) }
 }
 
-/// Returns a graph as a text in the format of a path's extension, and notes about what the format cannot express.
+/// Path of a file, and its text.
+type FileText = (PathBuf, String);
+
+/// Returns the files of a graph at a path, in the format of its extension, with notes about what the format cannot
+/// express. `like` is the file or folder from which the graph was read.
 #[pyfunction]
 fn formatted(
     py: Python<'_>,
     graph: &Bound<'_, Graph>,
     values: &Bound<'_, Values>,
     path: PathBuf,
-) -> PyResult<(String, Vec<String>)> {
+    like: Option<PathBuf>,
+) -> PyResult<(Vec<FileText>, Vec<String>)> {
     let (graph, values) = (snapshot(graph)?, values.try_borrow()?.0.snapshot());
     let (graph, values) = (&*graph, &*values);
     if let Some(format) = Format::of_path(&path) {
-        return Ok((document_in(py, graph, values, format)?, vec![]));
+        return Ok((vec![(path, document_in(py, graph, values, format)?)], vec![]));
     }
-    let Some(writer) = GraphFormat::by_extension(&path).and_then(|format| format.format) else {
+    let Some(writer) = GraphFormat::of_destination(&path).and_then(|format| format.format) else {
         let written = GraphFormat::all().into_iter().filter(|format| format.format.is_some());
         let others: String =
             written.flat_map(|format| format.extensions).map(|e| format!(", .{e}")).collect();
-        let message =
-            format!("{}: expected one of the extensions .toml, .json, .yaml{others}", path.display());
+        let message = format!(
+            "{}: expected one of the extensions .toml, .json, .yaml{others}, or none for a folder",
+            path.display()
+        );
         return Err(errors::argument("save", "path", message));
     };
-    let (found, written) = detach(py, || (graph.check(values), writer(graph, values)))?;
-    if found.is_empty() { Ok(written) } else { Err(misfit(&found)) }
+    let (found, written) = detach(py, || (graph.check(values), writer(graph, values, like.as_deref())))?;
+    if !found.is_empty() {
+        return Err(misfit(&found));
+    }
+    let written = written.map_err(|error| unreadable("save", "like", error))?;
+    let files = written.at(&path).map(|(file, text)| (file, text.to_owned())).collect();
+    Ok((files, written.notes))
 }
 
 /// The exception for mistakes between a graph and its values.
@@ -91,11 +103,13 @@ fn read(
         return Ok((Graph(graph.into()), Values(values.into()), vec![]));
     }
     let read = detach(py, || {
-        let text = read_text(&path)?;
-        let format = GraphFormat::detect(&path, &text);
-        format.map(|format| (format.parse)(&text, &path, ReadOptions { repair, anchor, lenient })).transpose()
+        let folder = GraphFormat::of_folder(&path);
+        let file = folder.as_ref().map_or(&path, |(_, file)| file);
+        let text = read_text(file)?;
+        let format = folder.as_ref().map(|(format, _)| *format).or_else(|| GraphFormat::detect(&path, &text));
+        format.map(|format| (format.parse)(&text, file, ReadOptions { repair, anchor, lenient })).transpose()
     })?;
-    match read.map_err(unreadable)? {
+    match read.map_err(|error| unreadable("load", "path", error))? {
         Some(read) => Ok((Graph(read.graph.into()), Values(read.values.into()), read.notes)),
         None => {
             let message = format!(
@@ -107,13 +121,13 @@ fn read(
     }
 }
 
-fn unreadable(error: FormatError) -> PyErr {
+fn unreadable(function: &str, argument: &str, error: FormatError) -> PyErr {
     match error {
         FormatError::Io { path, source } => {
             let code = source.raw_os_error().unwrap_or_default();
             PyOSError::new_err((code, source.to_string(), path))
         }
-        other => errors::argument("load", "path", other),
+        other => errors::argument(function, argument, other),
     }
 }
 

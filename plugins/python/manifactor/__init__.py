@@ -31,7 +31,7 @@ from .groups import Group
 from .frames import poses, rotations, to_pandas
 from .logs import enable_logging
 from .losses import *
-from .report import Page, Report, Summary, experiment, online, run, written
+from .report import Page, Report, Summary, exists, experiment, online, run, written
 from .solvers import auto, dogleg, gauss_newton, gnc, levenberg_marquardt
 from .traced import Check, TracedFactor, check_factor, factor
 from .variables import *
@@ -109,7 +109,8 @@ __all__ += variables.__all__
 def load(
     path: str | os.PathLike[str], *, repair: str = "error", anchor: bool = True, lenient: bool = False
 ) -> tuple[Graph, Values]:
-    """Reads a graph and its values from a file: TOML, JSON, YAML, or g2o, TORO, BAL.
+    """Reads a graph and its values from a file: TOML, JSON, YAML, or g2o, TORO, BAL; or from the folder of a COLMAP
+    model, as text.
 
     `repair` selects the treatment of information matrices that are not positive definite: `"error"`,
     `"reject"` or `"clamp"`. `anchor` fixes the first pose if nothing in the file fixes the gauge. `lenient`
@@ -119,14 +120,28 @@ def load(
     return graph, values
 
 
-def save(path: str | os.PathLike[str], graph: Graph, values: Values, *, force: bool = False) -> None:
+def save(
+    path: str | os.PathLike[str],
+    graph: Graph,
+    values: Values,
+    *,
+    force: bool = False,
+    like: str | os.PathLike[str] | None = None,
+) -> None:
     """Writes a graph and its values to a file, in the format of its extension: a document (TOML, JSON, YAML), or
-    g2o or BAL. `load` and `manifactor solve` read it.
+    g2o or BAL. A path without an extension is a folder for a model of COLMAP. `load` and `manifactor solve` read it.
 
     An existing file is replaced only with `force`. A graph that does not fit its values is an error; parts that
-    the format cannot express, such as losses in g2o, are left out with a warning.
+    the format cannot express, such as losses in g2o, are left out with a warning. `like` is the folder from which a
+    model of COLMAP was loaded: names of images, colours and image points without a point in space are taken from it.
     """
-    text, notes = _formatted(graph, values, path)
+    files, notes = _formatted(graph, values, path, like)
     for note in notes:
         warnings.warn(note, stacklevel=2)
-    written(path, text, force)
+    for file, _ in files:
+        if not force and os.path.lexists(file):
+            raise exists(file)
+    for file, text in files:
+        if os.fspath(file) != os.fspath(path):
+            os.makedirs(path, exist_ok=True)
+        written(file, text, force)

@@ -137,8 +137,12 @@ def written(path: str | os.PathLike[str], text: str, force: bool) -> None:
         with open(path, "w" if force else "x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        mistake = Mistake(os.fspath(path), "the file exists already", "`force=True` replaces it")
-        raise ExistsError("", [mistake]) from None
+        raise exists(path) from None
+
+
+def exists(path: str | os.PathLike[str]) -> ExistsError:
+    """Makes the exception for a file that is there already."""
+    return ExistsError("", [Mistake(os.fspath(path), "the file exists already", "`force=True` replaces it")])
 
 
 def overrides(values: Mapping[str, Any] | Sequence[str]) -> list[str]:

@@ -2,7 +2,7 @@
 use crate::bundle::camera_model::camera_document;
 use crate::{Camera, CameraModel, Coordinates, register_camera};
 use manifactor_graph::Scalar;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{SVector, U8, Vector2, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -57,12 +57,16 @@ impl KannalaBrandt {
     }
 
     /// Returns the radius of a ray at an angle, in focal lengths.
-    #[inline(always)]
-    fn radius<T: Scalar>(&self, theta: T) -> T {
-        let [k1, k2, k3, k4] = self.distortion.map(T::from);
-        let s = theta * theta;
-        theta * (T::from(1.0) + s * (k1 + s * (k2 + s * (k3 + s * k4))))
+    fn radius(&self, theta: f64) -> f64 {
+        radius(self.distortion, theta)
     }
+}
+
+/// Returns the radius of a ray at an angle with the coefficients k₁ to k₄, in focal lengths.
+#[inline(always)]
+fn radius<T: Scalar>([k1, k2, k3, k4]: [T; 4], theta: T) -> T {
+    let s = theta * theta;
+    theta * (T::from(1.0) + s * (k1 + s * (k2 + s * (k3 + s * k4))))
 }
 
 /// Returns the place in an interval at which a condition begins to hold.
@@ -78,17 +82,38 @@ impl CameraModel for KannalaBrandt {
     const EXAMPLE: &'static str = "{ fx = 285.0, fy = 285.0, cx = 424.0, cy = 400.0, width = 848, height = 800, \
                                    distortion = [0.01, 0.02, 0.0, 0.0] }";
 
+    type Dim = U8;
+    const INTRINSICS: &'static [&'static str] = &["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"];
+
     #[inline(always)]
-    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+    fn intrinsics(&self) -> SVector<f64, 8> {
+        let (Camera { fx, fy, cx, cy, .. }, [k1, k2, k3, k4]) = (self.pinhole, self.distortion);
+        SVector::from([fx, fy, cx, cy, k1, k2, k3, k4])
+    }
+
+    fn with_intrinsics(&self, intrinsics: &SVector<f64, 8>) -> Self {
+        let [fx, fy, cx, cy, k1, k2, k3, k4] = (*intrinsics).into();
+        Self::new(Camera { fx, fy, cx, cy, ..self.pinhole }, [k1, k2, k3, k4])
+    }
+
+    #[inline(always)]
+    fn is_valid(&self) -> bool {
+        self.pinhole.is_valid()
+    }
+
+    #[inline(always)]
+    fn project_with<T: Scalar>(&self, intrinsics: &SVector<T, 8>, point: &Vector3<T>) -> Vector2<T> {
+        let [fx, fy, cx, cy, k1, k2, k3, k4] = (*intrinsics).into();
         let square = point.x * point.x + point.y * point.y;
         let ahead = point.z > T::zero();
         let scale = if ahead && square <= point.z * point.z * T::from(SMALL) {
             point.z.recip()
         } else {
             let side = square.sqrt();
-            self.radius(side.atan2(point.z)) / side
+            radius([k1, k2, k3, k4], side.atan2(point.z)) / side
         };
-        self.pinhole.project(&Vector3::new(point.x * scale, point.y * scale, T::from(1.0)))
+        let seen = Vector3::new(point.x * scale, point.y * scale, T::from(1.0));
+        self.pinhole.project_with(&Vector4::new(fx, fy, cx, cy), &seen)
     }
 
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
@@ -117,7 +142,7 @@ impl CameraModel for KannalaBrandt {
     }
 }
 
-register_camera!("kannala_brandt", "projection_kannala_brandt", KannalaBrandt);
+register_camera!("kannala_brandt", "projection_kannala_brandt", "uncalibrated_kannala_brandt", KannalaBrandt);
 
 impl TryFrom<Document> for KannalaBrandt {
     type Error = crate::CameraError;

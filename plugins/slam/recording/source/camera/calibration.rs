@@ -64,7 +64,7 @@ impl CalibrationFile {
         let text = read_text(&file)?;
         let fault = |fault: String| SourceError::Calibration { file: file.clone(), fault };
         let cameras = if file.extension().is_some_and(|extension| extension == "txt") {
-            colmap(&text).map_err(fault)?
+            colmap(&text)
         } else {
             yaml(&file, &text)?
         };
@@ -177,58 +177,16 @@ fn kalibr(camera: &KalibrCamera) -> Result<Arc<dyn AnyCamera>, String> {
     }
 }
 
-/// Returns the cameras of COLMAP's `cameras.txt`: lines `id model width height parameters`.
-fn colmap(text: &str) -> Result<Vec<NamedCamera>, String> {
+/// Returns the cameras of COLMAP's `cameras.txt`, each with the number as its name.
+fn colmap(text: &str) -> Vec<NamedCamera> {
     let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     let rows = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     rows.map(|(number, line)| {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let [id, model, width, height, ref parameters @ ..] = words[..] else {
-            return Err(format!("line {number}: expected `id model width height parameters`, got `{line}`"));
-        };
-        let parse = |word: &str| {
-            word.parse::<f64>().map_err(|_| format!("line {number}: expected a number, got `{word}`"))
-        };
-        let size = |word: &str| {
-            word.parse::<u32>().map_err(|_| format!("line {number}: expected pixels, got `{word}`"))
-        };
-        let [width, height] = [size(width)?, size(height)?];
-        let parameters = parameters.iter().map(|word| parse(word)).collect::<Result<Vec<f64>, _>>()?;
-        Ok((id.to_owned(), colmap_camera(model, [width, height], &parameters)))
+        let name = line.split_whitespace().next().unwrap_or_default().to_owned();
+        let camera = manifactor_formats::colmap::camera(line);
+        (name, camera.map(|camera| camera.lens.camera()).map_err(|error| format!("line {number}: {error}")))
     })
     .collect()
-}
-
-fn colmap_camera(
-    model: &str,
-    [width, height]: [u32; 2],
-    parameters: &[f64],
-) -> Result<Arc<dyn AnyCamera>, String> {
-    let with = |numbers: [f64; 4], distortion: &str, coefficients: &[f64]| {
-        let camera = Camera::new(numbers, width, height).map_err(|error| error.to_string())?;
-        with_distortion(camera, distortion, coefficients)
-    };
-    match (model, parameters) {
-        ("SIMPLE_PINHOLE", [f, cx, cy]) => with([*f, *f, *cx, *cy], "none", &[]),
-        ("PINHOLE", [fx, fy, cx, cy]) => with([*fx, *fy, *cx, *cy], "none", &[]),
-        ("SIMPLE_RADIAL", [f, cx, cy, k]) => with([*f, *f, *cx, *cy], "plumb_bob", &[*k, 0.0, 0.0, 0.0]),
-        ("RADIAL", [f, cx, cy, k1, k2]) => with([*f, *f, *cx, *cy], "plumb_bob", &[*k1, *k2, 0.0, 0.0]),
-        ("OPENCV", [fx, fy, cx, cy, k @ ..]) if k.len() == 4 => with([*fx, *fy, *cx, *cy], "plumb_bob", k),
-        ("FULL_OPENCV", [fx, fy, cx, cy, k @ ..]) if k.len() == 8 => {
-            with([*fx, *fy, *cx, *cy], "plumb_bob", k)
-        }
-        ("OPENCV_FISHEYE", [fx, fy, cx, cy, k @ ..]) if k.len() == 4 => {
-            with([*fx, *fy, *cx, *cy], "equidistant", k)
-        }
-        (
-            "SIMPLE_PINHOLE" | "PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV" | "FULL_OPENCV"
-            | "OPENCV_FISHEYE",
-            _,
-        ) => Err(format!("unexpected number of parameters for {model}: {}", parameters.len())),
-        _ => Err(format!(
-            "expected the model SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV or OPENCV_FISHEYE, got {model}"
-        )),
-    }
 }
 
 #[cfg(test)]
@@ -315,10 +273,10 @@ cam2:
         let error = read("cameras.txt", twice, Some("1")).unwrap_err();
         assert!(error.contains("there are several cameras `1`"), "{error}");
         for (wrong, words) in [
-            ("1 SIMPLE_RADIAL 800 600 500 400 300\n", "number of parameters"),
+            ("1 SIMPLE_RADIAL 800 600 500 400 300\n", "expected 4 parameters of SIMPLE_RADIAL, got 3"),
             ("1 FOV 800 600 500 500 400 300 0.9\n", "got FOV"),
-            ("1 PINHOLE 800\n", "line 1: expected `id model"),
-            ("1 PINHOLE 800 600 500 x 400 300\n", "line 1: expected a number, got `x`"),
+            ("1 PINHOLE 800\n", "line 1: expected 5 fields (id model width height parameters), got 3"),
+            ("1 PINHOLE 800 600 500 x 400 300\n", "line 1: expected a finite number, got `x`"),
             ("1 PINHOLE 800 600 -500 500 400 300\n", "expected fx"),
         ] {
             let error = read("cameras.txt", wrong, None).unwrap_err();

@@ -1,0 +1,57 @@
+//! Models of COLMAP as text: a folder with `cameras.txt`, `images.txt` and `points3D.txt`.
+//!
+//! | file | lines |
+//! | --- | --- |
+//! | `cameras.txt` | `id model width height parameters` |
+//! | `images.txt` | two per image: `id qw qx qy qz tx ty tz camera name`, then `x y point` for each image point |
+//! | `points3D.txt` | `id x y z r g b error`, then `image index` for each image point |
+//!
+//! Rotation and translation of an image map points from the world frame to the camera's frame, x right, y down, z
+//! forward; a pose stores the inverse. Pixels count from the corner of the image. Variables get the keys `camera<id>`,
+//! `image<id>` and `point<id>`. Each image point with a point in space becomes an `uncalibrated_…` factor with a standard
+//! deviation of one pixel; images share the intrinsics of their camera.
+//!
+//! Held are: what a camera model does not have, such as k₂ of `SIMPLE_RADIAL`; principal points, as in COLMAP's own
+//! bundle adjustment; what no image point observes; points in fewer than two images; and, unless the reader is asked not
+//! to, the pose of one image and a direction of another, for the [gauge](crate::bal).
+//!
+//! `rigs.txt` and `frames.txt` are not read: each image has a pose of its own.
+use crate::error::FormatError;
+use crate::graph_format::{GraphFormat, GraphText};
+use manifactor_graph::{Graph, Values};
+use std::path::Path;
+
+mod build;
+mod lens;
+mod model;
+mod parse;
+mod write;
+
+pub use lens::{Lens, LensError, Model as CameraModelName};
+pub use model::{Camera, Image, ImagePoint, Model, Point};
+pub use parse::camera;
+
+/// Names of the files of a model.
+const CAMERAS: &str = "cameras.txt";
+const IMAGES: &str = "images.txt";
+const POINTS: &str = "points3D.txt";
+
+crate::register_graph_format!(GraphFormat {
+    name: "COLMAP",
+    extensions: &[],
+    folder: Some(IMAGES),
+    begins: |text| text.starts_with("# Image list with two lines of data per image"),
+    parse: |text, path, reading| Ok(Model::parse(text, path)?.graph(reading.anchor)),
+    format: Some(format),
+});
+
+/// Returns the model of a graph as texts. What a graph does not have, such as names of images and colours, is that of the
+/// model in `like`, if that is one.
+fn format(graph: &Graph, values: &Values, like: Option<&Path>) -> Result<GraphText, FormatError> {
+    let like = like.filter(|folder| folder.join(IMAGES).is_file());
+    let (model, notes) = match like {
+        Some(folder) => Model::read(folder)?.with_values(values),
+        None => Model::of_graph(graph, values),
+    };
+    Ok(GraphText { files: model.texts().map(|(name, text)| (Some(name), text)).into(), notes })
+}
