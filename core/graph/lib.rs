@@ -29,7 +29,7 @@ pub use registry::{TypeName, UnknownType, catalogue, checked};
 pub use residual::{Jacobians, Lifted, List, Many, Refs, Residual, Variables, normal_equations};
 pub use variable::{AsVariable, ErasedManifold, Variable, as_variable, column, manifold_name};
 pub use variable::{
-    Bounds, Interval, IntervalError, Key, Manifold, OutOfBounds, Tangent, ValueError, Values,
+    Bounds, Interval, IntervalError, Key, Manifold, Motion, OutOfBounds, Tangent, ValueError, Values,
 };
 
 #[doc(hidden)]

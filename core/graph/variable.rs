@@ -13,7 +13,7 @@ use std::fmt::Debug;
 
 pub use bounds::{Bounds, Interval, IntervalError, OutOfBounds};
 pub use key::Key;
-pub use manifold::{Manifold, Tangent};
+pub use manifold::{Manifold, Motion, Tangent};
 pub use values::{ValueError, Values};
 
 /// A point of a registered manifold. Implemented by [`register_manifold!`](crate::register_manifold).
@@ -80,6 +80,8 @@ pub trait ErasedManifold {
     fn coordinate(&self, direction: usize) -> Option<f64>;
     /// See [`Manifold::position`].
     fn position(&self) -> Option<[f64; 3]>;
+    /// See [`Manifold::moved`].
+    fn moved(&self, motion: Motion) -> Option<Vec<f64>>;
     /// Returns whether every coordinate is finite.
     fn is_finite(&self) -> bool;
     /// Returns a copy of the point.
@@ -114,6 +116,9 @@ impl<M: Manifold + Variable> ErasedManifold for M {
     }
     fn position(&self) -> Option<[f64; 3]> {
         Manifold::position(self)
+    }
+    fn moved(&self, motion: Motion) -> Option<Vec<f64>> {
+        Some(Manifold::moved(self, motion)?.as_ref().to_vec())
     }
     fn is_finite(&self) -> bool {
         Manifold::is_finite(self)

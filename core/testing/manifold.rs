@@ -1,14 +1,16 @@
 //! The laws of manifolds.
 use crate::differences::differentiate;
 use crate::error::{LawError, json_of};
-use manifactor_graph::Variable;
 use manifactor_graph::quantity::variable_quantity;
+use manifactor_graph::{Motion, Variable};
 use serde_json::Value;
 
 /// Largest distance of two points that count as equal, relative to the largest coordinate or to 1.
 const TOLERANCE: f64 = 1e-9;
 /// Longest step of the differences.
 const LONGEST_STEP: f64 = 1e-2;
+/// Step of the differences along motions of the frame.
+const MOTION_STEP: f64 = 1e-4;
 /// Largest difference between the derivatives of `seed` and numeric ones, relative to the largest derivative
 /// or to 1.
 const SEED_TOLERANCE: f64 = 1e-6;
@@ -17,7 +19,7 @@ const SEED_TOLERANCE: f64 = 1e-6;
 /// be inside of the chart (for rotations: shorter than π).
 ///
 /// The laws are `x ⊞ 0 = x`; `x ⊞ (y ⊟ x) = y`; `(x ⊞ δ) ⊟ x = δ`; all results are finite; steps add to
-/// coordinates; each direction has a name; a document of x reads back as an equal document; [`seed_law`].
+/// coordinates; each direction has a name; motions of the frame move its position; a document of x reads back as an equal document; [`seed_law`].
 ///
 /// # Errors
 /// The first law that does not hold.
@@ -51,6 +53,22 @@ pub fn manifold_laws(x: &dyn Variable, y: &dyn Variable, delta: &[f64]) -> Resul
     let law = "x.retract(x.local(y)) is y";
     let there = from.retract(&from.local(y).ok_or_else(wrong(law))?).ok_or_else(wrong(law))?;
     small(law, distance(y, &*there))?;
+
+    let law = "x moves with everything in its frame as its position does";
+    for motion in Motion::ALL {
+        let (Some(moved), Some(position)) = (from.moved(motion), from.position()) else { continue };
+        let at = |step: f64| {
+            let delta: Vec<f64> = moved.iter().map(|d| step * d).collect();
+            from.retract(&delta).and_then(|x| x.erased().position()).ok_or_else(wrong(law))
+        };
+        let (ahead, behind) = (at(MOTION_STEP)?, at(-MOTION_STEP)?);
+        for ((a, b), velocity) in ahead.iter().zip(behind).zip(motion.velocity(position)) {
+            let size = position.iter().fold(1.0, |max: f64, x| max.max(x.abs()));
+            let error = ((a - b) / (2.0 * MOTION_STEP) - velocity).abs();
+            // the third coordinate of a point in the plane stays
+            require(error <= SEED_TOLERANCE * size || position[2] == 0.0, law)?;
+        }
+    }
 
     let law = "x.local(x.retract(delta)) is delta";
     let moved = from.retract(delta).ok_or_else(wrong(law))?;

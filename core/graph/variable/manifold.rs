@@ -48,8 +48,57 @@ pub trait Manifold: Clone + Debug + Send + Sync + 'static {
         None
     }
 
+    /// Returns the tangent vector along which the point moves if everything in the frame of the graph moves. `None` if
+    /// it stays, such as the intrinsics of a camera. Default: `None`.
+    ///
+    /// A cost that does not change along it is reported as a free position, orientation or scale.
+    fn moved(&self, _motion: Motion) -> Option<Vector<Self::Dim>> {
+        None
+    }
+
     /// Returns whether every coordinate is finite.
     fn is_finite(&self) -> bool;
+}
+
+/// A motion of everything in the frame of a graph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// Along the axis with this index.
+    Translation(usize),
+    /// About the axis with this index, through the origin.
+    Rotation(usize),
+    /// Away from the origin, by one per unit of distance.
+    Scale,
+}
+
+impl Motion {
+    /// All motions.
+    pub const ALL: [Self; 7] = [
+        Self::Translation(0),
+        Self::Translation(1),
+        Self::Translation(2),
+        Self::Rotation(0),
+        Self::Rotation(1),
+        Self::Rotation(2),
+        Self::Scale,
+    ];
+
+    /// Returns the velocity of rotation, in the frame of the graph.
+    pub fn rotation(self) -> [f64; 3] {
+        std::array::from_fn(|axis| f64::from(self == Self::Rotation(axis)))
+    }
+
+    /// Returns the velocity of a place, in the frame of the graph.
+    pub fn velocity(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Translation(moving) => std::array::from_fn(|axis| f64::from(axis == moving)),
+            Self::Rotation(_) => {
+                let [wx, wy, wz] = self.rotation();
+                [wy * z - wz * y, wz * x - wx * z, wx * y - wy * x]
+            }
+            Self::Scale => [x, y, z],
+        }
+    }
 }
 
 /// A tangent vector of `M`.

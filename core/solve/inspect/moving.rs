@@ -21,7 +21,7 @@ impl Problem {
             return None;
         }
         let scale: Vec<f64> = self.system.diagonal().copied().collect();
-        let Undetermined { keys, direction, moving } = name(&self.model, &step, &scale);
+        let Undetermined { keys, direction, moving, .. } = name(&self.model, &step, &scale);
         Some(LargestMoves { keys, direction, moving })
     }
 }

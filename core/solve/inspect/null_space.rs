@@ -1,8 +1,9 @@
 //! Search for undetermined variables and directions.
 use crate::linear::Method;
-use crate::linear::system::NoFactor;
+use crate::linear::system::{LinearSystem, NoFactor};
 use crate::outcome::Undetermined;
 use crate::problem::{Model, Problem};
+use manifactor_graph::Motion;
 use std::time::Instant;
 
 /// A pivot below this share of its diagonal entry triggers the search.
@@ -15,6 +16,8 @@ const ROUNDING_SHARE: f64 = 1e-24;
 const DIAGONAL_FLOOR: f64 = 1e-9;
 /// Damping that makes the matrix positive definite for the search.
 const SEARCH_DAMPING: f64 = 1e-10;
+/// Largest share of a direction that is left when the motions of the whole are taken from it.
+const MAX_REST: f64 = 1e-3;
 /// Number of variables named in a report.
 const MAX_NAMED: usize = 3;
 
@@ -95,7 +98,27 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
         let length = v.iter().zip(&scale).map(|(v, d)| v * v * d).sum::<f64>().sqrt();
         v.iter_mut().for_each(|v| *v /= length);
     }
-    // by the rows of J, because rounding would dominate the quadratic form of H
+    if curvature(model, system, &v) >= MAX_CURVATURE {
+        return None;
+    }
+    let motions = free_motions(model, system, &scale);
+    let mut found = Undetermined { free: words(&motions), ..Undetermined::default() };
+    for (_, motion) in &motions {
+        let along: f64 = product(&v, motion, &scale);
+        v.iter_mut().zip(motion).for_each(|(v, m)| *v -= along * m);
+    }
+    // the rest of a direction that is no motion of the whole
+    if motions.is_empty() || product(&v, &v, &scale) > MAX_REST {
+        found = Undetermined { free: found.free, ..name(model, &v, &scale) };
+    } else {
+        found.moving = model.variables.iter().filter(|place| place.start.is_some()).count();
+    }
+    Some(found)
+}
+
+/// Returns ‖J v‖², with the squares of what is held at a bound. From the rows of J, because rounding would dominate the
+/// quadratic form of H.
+fn curvature(model: &Model, system: &LinearSystem, v: &[f64]) -> f64 {
     let mut bent: f64 = system.held.iter().map(|i| v[*i] * v[*i]).sum();
     model.rows(&mut |factor| {
         let rows = factor.residual.len();
@@ -106,7 +129,68 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
             bent += factor.blocks.iter().map(along).sum::<f64>().powi(2);
         }
     });
-    (bent < MAX_CURVATURE).then(|| name(model, &v, &scale))
+    bent
+}
+
+fn product(a: &[f64], b: &[f64], scale: &[f64]) -> f64 {
+    a.iter().zip(b).zip(scale).map(|((a, b), d)| a * b * d).sum()
+}
+
+/// Returns the motions of the whole along which the cost is constant, orthogonal and of unit length in the metric of the
+/// diagonal.
+fn free_motions(model: &Model, system: &LinearSystem, scale: &[f64]) -> Vec<(Motion, Vec<f64>)> {
+    let mut free: Vec<(Motion, Vec<f64>)> = vec![];
+    for motion in Motion::ALL {
+        let mut v = vec![0.0; scale.len()];
+        for place in &model.variables {
+            let value = place.start.and_then(|_| model.columns().column(place.column).get(place.index));
+            if let (Some(start), Some(moved)) = (place.start, value.and_then(|x| x.erased().moved(motion))) {
+                v[start..start + moved.len()].copy_from_slice(&moved);
+            }
+        }
+        let length = product(&v, &v, scale).sqrt();
+        if !(length > 0.0 && length.is_finite()) {
+            continue;
+        }
+        v.iter_mut().for_each(|v| *v /= length);
+        if curvature(model, system, &v) >= MAX_CURVATURE {
+            continue;
+        }
+        for (_, other) in &free {
+            let along = product(&v, other, scale);
+            v.iter_mut().zip(other).for_each(|(v, m)| *v -= along * m);
+        }
+        let length = product(&v, &v, scale).sqrt();
+        if length > MAX_REST {
+            v.iter_mut().for_each(|v| *v /= length);
+            free.push((motion, v));
+        }
+    }
+    free
+}
+
+/// Returns the words for motions: those about or along all axes have one.
+fn words(motions: &[(Motion, Vec<f64>)]) -> Vec<String> {
+    let axes = |is: fn(Motion) -> Option<usize>| -> Vec<&str> {
+        motions.iter().filter_map(|(motion, _)| ["x", "y", "z"].get(is(*motion)?).copied()).collect()
+    };
+    let along = axes(|motion| if let Motion::Translation(axis) = motion { Some(axis) } else { None });
+    let about = axes(|motion| if let Motion::Rotation(axis) = motion { Some(axis) } else { None });
+    let mut words = vec![];
+    match along[..] {
+        [] => {}
+        [_, _, _] | ["x", "y"] => words.push("position".to_owned()),
+        _ => words.push(format!("position along {}", along.join(" and "))),
+    }
+    match about[..] {
+        [] => {}
+        [_, _, _] => words.push("orientation".to_owned()),
+        _ => words.push(format!("orientation about {}", about.join(" and "))),
+    }
+    if motions.iter().any(|(motion, _)| *motion == Motion::Scale) {
+        words.push("scale".to_owned());
+    }
+    words
 }
 
 /// Describes a direction by variables and the names of their tangent directions.
@@ -135,5 +219,5 @@ pub(crate) fn name(model: &Model, v: &[f64], scale: &[f64]) -> Undetermined {
         direction.extend(entries.map(|(x, name)| (place.key.clone(), *name, sign * x / largest)));
     }
     let keys = moves.iter().map(|(i, _)| model.variables[*i].key.clone()).collect();
-    Undetermined { keys, direction, moving }
+    Undetermined { free: vec![], keys, direction, moving }
 }

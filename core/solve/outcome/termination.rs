@@ -71,9 +71,12 @@ pub enum Stall {
 }
 
 /// A direction along which the cost is constant.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Undetermined {
-    /// The variables that move most, in descending order of motion.
+    /// Motions of the whole along which the cost is constant, such as `position`, `orientation about z` and `scale`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub free: Vec<String>,
+    /// The variables that move most, in descending order of motion. None if only the whole moves.
     pub keys: Vec<Key>,
     /// Motion of each of these variables: name of the tangent direction, and its share.
     pub direction: Vec<(Key, &'static str, f64)>,
@@ -96,11 +99,38 @@ impl fmt::Display for Undetermined {
             0 => String::new(),
             n => format!(", and {n} more variables with them"),
         };
-        write!(
-            f,
-            "nothing constrains {}{more}; add a prior or another measurement, or fix one of them",
-            parts.join(", ")
-        )
+        let parts = parts.join(", ");
+        match (&self.free[..], self.keys.is_empty()) {
+            ([], _) => {
+                write!(
+                    f,
+                    "nothing constrains {parts}{more}; add a prior or another measurement, or fix one of them"
+                )
+            }
+            (free, true) => {
+                write!(f, "nothing constrains the {} of the whole; ", and(free))?;
+                f.write_str(if free.iter().any(|what| what == "scale") {
+                    "fix one pose, and for the scale the distance of another, or add measurements in the frame of the map"
+                } else {
+                    "fix one pose, or add measurements in the frame of the map"
+                })
+            }
+            (free, false) => write!(
+                f,
+                "nothing constrains the {} of the whole, and {parts}{more}; add priors or other measurements, or fix one of \
+                 the variables",
+                and(free)
+            ),
+        }
+    }
+}
+
+/// Returns `a`, `a and b`, `a, b and c`.
+fn and(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [only] => only.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
 }
 

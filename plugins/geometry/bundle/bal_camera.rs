@@ -3,6 +3,7 @@
 use crate::groups::Coordinates;
 use crate::groups::Se3;
 use crate::groups::Xyzw;
+use manifactor_graph::Motion;
 use manifactor_graph::prelude::*;
 use nalgebra::SVector;
 
@@ -123,6 +124,9 @@ impl Manifold for BalCamera {
     }
     fn position(&self) -> Option<[f64; 3]> {
         Some(self.world_from_camera.translation.into())
+    }
+    fn moved(&self, motion: Motion) -> Option<SVector<f64, 9>> {
+        Some(self.world_from_camera.moved(motion)?.fixed_resize::<9, 1>(0.0))
     }
     fn is_finite(&self) -> bool {
         let numbers = [self.focal_length, self.distortion.x, self.distortion.y];

@@ -1,7 +1,7 @@
 //! Points: Rⁿ, with x ⊞ δ = x + δ.
 use crate::groups::Coordinates;
 use crate::groups::lie_group::additive_group;
-use manifactor_graph::{Dimension, JetOf, Lift, Manifold, Scalar, register_manifold};
+use manifactor_graph::{Dimension, JetOf, Lift, Manifold, Motion, Scalar, register_manifold};
 use nalgebra::{Const, SVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -110,6 +110,10 @@ impl<const N: usize> Manifold for Rn<N> {
             [x, y, z] => Some([x, y, z]),
             _ => None,
         }
+    }
+    fn moved(&self, motion: Motion) -> Option<SVector<f64, N>> {
+        let velocity = motion.velocity(self.position()?);
+        Some(SVector::from_fn(|i, _| velocity[i]))
     }
     fn is_finite(&self) -> bool {
         self.0.iter().all(|x| x.is_finite())

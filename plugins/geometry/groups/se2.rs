@@ -4,7 +4,7 @@ use crate::groups::LieGroup;
 use crate::groups::small_angle;
 use crate::groups::{Angle, So2};
 use manifactor_graph::quantity::{Quantity, Shape};
-use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
+use manifactor_graph::{Jet, JetOf, Lift, Manifold, Motion, Scalar, register_manifold};
 use nalgebra::{Matrix3, U3, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -162,6 +162,10 @@ impl Manifold for Se2 {
     }
     fn position(&self) -> Option<[f64; 3]> {
         Some([self.translation.x, self.translation.y, 0.0])
+    }
+    fn moved(&self, motion: Motion) -> Option<Vector3<f64>> {
+        let ([.., turn], [x, y, _]) = (motion.rotation(), motion.velocity(self.position()?));
+        Some(self.rotation.inverse().act(&Vector2::new(x, y)).push(turn))
     }
     fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.translation.iter().all(|x| x.is_finite())

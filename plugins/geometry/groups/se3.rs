@@ -4,7 +4,7 @@ use crate::groups::LieGroup;
 use crate::groups::small_angle;
 use crate::groups::{So3, Xyzw, jet};
 use manifactor_graph::quantity::{Quantity, Shape};
-use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
+use manifactor_graph::{Jet, JetOf, Lift, Manifold, Motion, Scalar, register_manifold};
 use nalgebra::{Matrix3, Matrix4, Matrix6, U6, Vector3, Vector6};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -165,6 +165,11 @@ impl Manifold for Se3 {
     }
     fn position(&self) -> Option<[f64; 3]> {
         Some(self.translation.into())
+    }
+    fn moved(&self, motion: Motion) -> Option<Vector6<f64>> {
+        let local = |v: [f64; 3]| self.rotation.inverse().act(&v.into());
+        let (w, v) = (local(motion.rotation()), local(motion.velocity(self.translation.into())));
+        Some(Vector6::new(w.x, w.y, w.z, v.x, v.y, v.z))
     }
     fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.translation.iter().all(|x| x.is_finite())

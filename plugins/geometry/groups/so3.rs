@@ -3,7 +3,7 @@ use crate::groups::LieGroup;
 use crate::groups::small_angle;
 use crate::groups::so2::atan2;
 use manifactor_graph::quantity::{Quantity, Shape};
-use manifactor_graph::{Jet, JetOf, Manifold, Scalar, register_manifold};
+use manifactor_graph::{Jet, JetOf, Manifold, Motion, Scalar, register_manifold};
 use nalgebra::{Matrix3, Quaternion, Rotation3, U3, UnitQuaternion, Vector3, Vector4};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -213,6 +213,9 @@ impl Manifold for So3 {
     }
     fn local(&self, other: &Self) -> Vector3<f64> {
         self.between(other).log()
+    }
+    fn moved(&self, motion: Motion) -> Option<Vector3<f64>> {
+        Some(self.inverse().act(&motion.rotation().into()))
     }
     fn is_finite(&self) -> bool {
         self.0.coords.iter().all(|x| x.is_finite())

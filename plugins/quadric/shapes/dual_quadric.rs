@@ -5,7 +5,7 @@ use crate::shapes::{SemiAxes, semi_axes};
 use manifactor_geometry::{Coordinates, RotationError, Se3, So3};
 use manifactor_graph::invariance::Random;
 use manifactor_graph::quantity::{Quantity, Shape};
-use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
+use manifactor_graph::{Jet, JetOf, Lift, Manifold, Motion, Scalar, register_manifold};
 use nalgebra::{Matrix4, SVector, U9, Vector3, Vector6};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -170,6 +170,11 @@ impl Manifold for DualQuadric {
     }
     fn position(&self) -> Option<[f64; 3]> {
         Some(self.pose.translation.into())
+    }
+    fn moved(&self, motion: Motion) -> Option<SVector<f64, 9>> {
+        // the tangent of a semi-axis is its logarithm
+        let growth = f64::from(motion == Motion::Scale);
+        Some(self.pose.moved(motion)?.fixed_resize::<9, 1>(growth))
     }
     fn is_finite(&self) -> bool {
         self.pose.is_finite() && self.semi_axes.iter().all(|s| s.is_finite())
