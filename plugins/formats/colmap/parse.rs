@@ -36,8 +36,8 @@ impl Model {
         let images = images(text, path, &known)?;
         let file = folder.join(POINTS);
         let points_text = read_text(&file)?;
-        let points = points(&points_text, &file, &images)?;
-        let known: HashSet<u64> = points.iter().map(|point| point.id).collect();
+        let points = points(&points_text, &file)?;
+        let known: HashSet<u64> = points.iter().map(|(_, point)| point.id).collect();
         let mut problems = ProblemList::of(path, text);
         for (line, image) in &images {
             let seen = image.points.iter().filter_map(|point| point.point);
@@ -47,7 +47,12 @@ impl Model {
             }
         }
         problems.finish()?;
-        Ok(Self { cameras, images: images.into_iter().map(|(_, image)| image).collect(), points })
+        let mut problems = ProblemList::of(&file, &points_text);
+        check_tracks(&points, &images, &mut problems);
+        problems.finish()?;
+        let without_line = |(_, image)| image;
+        let images = images.into_iter().map(without_line).collect();
+        Ok(Self { cameras, images, points: points.into_iter().map(|(_, point)| point).collect() })
     }
 }
 
@@ -176,28 +181,36 @@ fn image_points(text: &str) -> Result<Vec<ImagePoint>, Mistake> {
     points.iter().map(point).collect()
 }
 
-fn points(text: &str, path: &Path, images: &[(usize, Image)]) -> Result<Vec<Point>, FormatError> {
-    let images: HashMap<u64, &Image> = images.iter().map(|(_, image)| (image.id, image)).collect();
+/// Returns the points with their line numbers.
+fn points(text: &str, path: &Path) -> Result<Vec<(usize, Point)>, FormatError> {
     let mut problems = ProblemList::of(path, text);
     let (mut points, mut seen) = (vec![], HashMap::new());
     for (line, text) in lines(text) {
-        let Some(point) = problems.ok(line, point(text)) else { continue };
-        once(&mut seen, point.id, "point", line, &mut problems);
+        if let Some(point) = problems.ok(line, point(text)) {
+            once(&mut seen, point.id, "point", line, &mut problems);
+            points.push((line, point));
+        }
+    }
+    problems.finish().map(|()| points)
+}
+
+/// Checks that images see the points where their tracks say so.
+fn check_tracks(points: &[(usize, Point)], images: &[(usize, Image)], problems: &mut ProblemList<'_>) {
+    let images: HashMap<u64, &Image> = images.iter().map(|(_, image)| (image.id, image)).collect();
+    for (line, point) in points {
         for (image, index) in &point.track {
-            let index = usize::try_from(*index).unwrap_or(usize::MAX);
-            let there = images.get(image).and_then(|image| image.points.get(index));
+            let place = usize::try_from(*index).unwrap_or(usize::MAX);
+            let there = images.get(image).and_then(|image| image.points.get(place));
             if there.is_none_or(|there| there.point != Some(point.id)) {
                 let what = format!(
                     "the track says that image {image} sees point {} at its image point {index}, counted from 0, but \
                      images.txt does not; write the model again with COLMAP",
                     point.id
                 );
-                problems.push(line, Mistake::Row(what));
+                problems.push(*line, Mistake::Row(what));
             }
         }
-        points.push(point);
     }
-    problems.finish().map(|()| points)
 }
 
 fn point(text: &str) -> Result<Point, Mistake> {

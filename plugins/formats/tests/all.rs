@@ -9,6 +9,7 @@
 )]
 mod auto;
 mod bal;
+mod colmap;
 mod gnc;
 mod online;
 mod pose_graphs;

@@ -43,6 +43,15 @@ impl ExtendedUnified {
         Self { pinhole, alpha: alpha.get(), beta: beta.get() }
     }
 
+    /// Works like [`new`](Self::new), for numbers that are not checked yet.
+    ///
+    /// # Errors
+    /// If α is not a number from 0 to 1, or β not a finite number above zero.
+    pub fn of_numbers(pinhole: Camera, alpha: f64, beta: f64) -> Result<Self, CameraError> {
+        let fault = CameraError { field: "beta", expected: "a finite number above zero", found: beta };
+        Ok(Self::new(pinhole, share(alpha)?, Positive::new(beta).map_err(|_| fault)?))
+    }
+
     fn distance(&self, point: &Vector3<f64>) -> f64 {
         (self.beta * point.xy().norm_squared() + point.z * point.z).sqrt()
     }
