@@ -234,7 +234,7 @@ impl Graph {
     }
     /// Bounds a coordinate of a variable, by the name of its direction:
     /// `graph.bound("camera", "f", Interval::new(400.0..=600.0)?)`. Steps stop at the bounds. A limit that the interval
-    /// does not have stays as it is, unless it contradicts the new one.
+    /// does not have stays as it is. Limits that exclude each other are an error at the solve.
     pub fn bound(&mut self, key: impl Into<Key>, direction: impl Into<String>, interval: Interval) {
         self.version = Version::default();
         self.bounds.entry(key.into()).or_default().insert(direction, interval);
@@ -266,7 +266,8 @@ impl Graph {
             None => {}
         }
         for (direction, interval) in other.bounds.get(key).into_iter().flat_map(Bounds::iter) {
-            self.bound(key.clone(), direction, interval);
+            self.version = Version::default();
+            self.bounds.entry(key.clone()).or_default().restrict(direction, interval);
         }
     }
     /// Fixes and bounds variables as another graph does.

@@ -93,6 +93,9 @@ pub struct TrackRow {
     pub point: Vector2<f64>,
 }
 
+/// Above it, two numbers can be one double.
+const MAX_LANDMARK: f64 = 9_007_199_254_740_992.0;
+
 /// Points of tracks, in the order of their timestamps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracks {
@@ -126,9 +129,9 @@ pub fn read_tracks(path: impl AsRef<Path>) -> Result<Tracks, FormatError> {
     let mut rows: Vec<TrackRow> = vec![];
     let mut seen = std::collections::BTreeSet::new();
     for (line, [timestamp, landmark, u, v]) in columns::rows(&text, wanted, &mut problems) {
-        if landmark < 0.0 || landmark.fract() != 0.0 {
+        if !(0.0..MAX_LANDMARK).contains(&landmark) || landmark.fract() != 0.0 {
             let field = Mistake::Field {
-                expected: "the number of a landmark, 0 or more",
+                expected: "the number of a landmark, from 0 to 9007199254740991",
                 found: landmark.to_string(),
             };
             problems.push(line, field);

@@ -5,6 +5,7 @@
 //! lines with equal timestamps, the first is used. Both cases are reported.
 use crate::error::{FormatError, Mistake, ProblemList};
 use crate::lines::{Fields, lines};
+use crate::text::words::{count, list};
 use crate::text::{read_text, write_text};
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::Manifold;
@@ -79,6 +80,22 @@ pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Trajectory, FormatErr
 }
 
 impl Trajectory {
+    /// Returns notes about lines that are not where or what they should be.
+    pub fn notes(&self) -> Vec<String> {
+        let lines = |lines: &[usize]| format!("{} ({})", count(lines.len(), "line"), list(lines.iter()));
+        let mut notes = vec![];
+        if !self.dropped.is_empty() {
+            let those = lines(&self.dropped);
+            notes.push(format!(
+                "{those} with the timestamp of an earlier line: left out; the first line counts"
+            ));
+        }
+        if !self.moved.is_empty() {
+            notes.push(format!("{} late: moved to their place by time", lines(&self.moved)));
+        }
+        notes
+    }
+
     fn add(&mut self, line: usize, pose: StampedPose) -> Result<(), Mistake> {
         let latest = self.poses.last().map_or(f64::NEG_INFINITY, |p| p.timestamp);
         if pose.timestamp < latest - MAX_LATENESS_S {

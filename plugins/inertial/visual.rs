@@ -53,7 +53,7 @@ pub struct VisualInertialSettings {
     pub gravity: Positive,
     /// Standard deviation of the accelerometer's bias before the first measurement, in m/s². Default: 0.1.
     pub accelerometer_bias: Positive,
-    /// Settings of the smoother.
+    /// Settings of the smoother, without a window.
     pub smoother: SmootherSettings,
 }
 
@@ -90,6 +90,9 @@ pub struct InertialState {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VisualInertialError {
+    /// The smoother has a window, but the solve at the end needs all poses.
+    #[error("a window of the smoother is not supported here: remove `settings.smoother.window`")]
+    Window,
     /// The readings at the beginning do not determine the state.
     #[error(transparent)]
     NotAtRest(#[from] NotAtRest),
@@ -205,6 +208,9 @@ impl VisualInertial {
         points: &[TrackedPoint],
         readings: &[ImuReading],
     ) -> Result<Self, VisualInertialError> {
+        if settings.smoother.window.is_some() {
+            return Err(VisualInertialError::Window);
+        }
         let state = at_rest(&settings, timestamp, readings)?;
         let (mut graph, mut values) = (Graph::new(), Values::new());
         let [x, v, b] = keys(0);

@@ -120,8 +120,8 @@ impl Graph {
         Ok((first, first + rows))
     }
 
-    /// Fixes a variable at its initial value, either entirely or only in the given directions of its
-    /// tangent space, in addition to those that are fixed.
+    /// Fixes a variable at its initial value. With `directions`, no step goes along these directions of its tangent space,
+    /// in addition to those that are fixed; those of a pose are the axes of its current frame.
     #[pyo3(signature = (key, directions = None))]
     fn fix(&mut self, key: &Bound<'_, PyAny>, directions: Option<Vec<String>>) -> PyResult<()> {
         let key = key_of("fix", key)?;

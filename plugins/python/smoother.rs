@@ -170,7 +170,8 @@ impl Smoother {
         to_python(py, &detach(py, || inner.rejections())?)
     }
 
-    /// Returns the active factors as a graph, with its fixed variables.
+    /// Returns the active factors as a graph, with its fixed variables. The linear priors that marginalized variables leave
+    /// are not in it, so a solve of it can differ from the estimate; `finish` includes them.
     fn graph(&self) -> Graph {
         Graph(self.inner.graph().0.into())
     }

@@ -77,7 +77,8 @@ pub(crate) struct VariableDocument {
     key: Key,
     /// Initial value.
     value: Box<dyn Variable>,
-    /// Directions that are held at the initial value, or `true` for all of them.
+    /// Tangent directions in which no step goes, or `true` for all of them. Those of a pose are the axes of its current
+    /// frame, so that a coordinate can change as the pose turns.
     #[serde(default)]
     fixed: Fixed,
     /// Limits of coordinates, by the names of their directions. Default: none.

@@ -40,7 +40,7 @@ macro_rules! loss {
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields, default)]
         pub struct $type {
-            /// The scale k of the formula above, in σ's.
+            /// The scale k of the formula above, in σ's unless the text says otherwise.
             pub scale: Positive,
         }
         impl $type {

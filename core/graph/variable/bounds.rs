@@ -141,17 +141,26 @@ impl fmt::Display for Interval {
 pub struct Bounds(IndexMap<String, Interval>);
 
 impl Bounds {
-    /// Sets the limits of a direction. A limit that the interval does not have stays as it is, unless it contradicts the
-    /// other one.
+    /// Sets the limits of a direction. A limit that the interval does not have stays as it is. Limits that exclude each
+    /// other are an error of the graph.
     pub fn insert(&mut self, direction: impl Into<String>, interval: Interval) {
-        let direction = direction.into();
-        let before = self.0.get(&direction).copied();
-        let joined = before.and_then(|before| {
-            let min = if interval.min.is_finite() { interval.min } else { before.min };
-            let max = if interval.max.is_finite() { interval.max } else { before.max };
-            Interval::between(min, max).ok()
+        self.change(direction.into(), |before| Interval {
+            min: if interval.min.is_finite() { interval.min } else { before.min },
+            max: if interval.max.is_finite() { interval.max } else { before.max },
         });
-        self.0.insert(direction, joined.unwrap_or(interval));
+    }
+    /// Bounds a direction by an interval in addition to the limits that it has. Limits that exclude each other are an
+    /// error of the graph.
+    pub fn restrict(&mut self, direction: impl Into<String>, interval: Interval) {
+        self.change(direction.into(), |before| Interval {
+            min: before.min.max(interval.min),
+            max: before.max.min(interval.max),
+        });
+    }
+    fn change(&mut self, direction: String, change: impl FnOnce(Interval) -> Interval) {
+        let unbounded = Interval { min: f64::NEG_INFINITY, max: f64::INFINITY };
+        let interval = self.0.entry(direction).or_insert(unbounded);
+        *interval = change(*interval);
     }
     /// Returns the bounded directions with their intervals.
     pub fn iter(&self) -> impl Iterator<Item = (&str, Interval)> {
@@ -192,7 +201,7 @@ impl Bounds {
 
 /// A coordinate that is out of its bounds.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("`{key}`: {direction} = {value} is out of its bounds: {interval}; begin within them")]
+#[error("{}", self.text())]
 pub struct OutOfBounds {
     /// The variable.
     pub key: Key,
@@ -202,6 +211,19 @@ pub struct OutOfBounds {
     pub value: f64,
     /// Its bounds.
     pub interval: Interval,
+}
+
+impl OutOfBounds {
+    fn text(&self) -> String {
+        let Self { key, direction, value, interval } = self;
+        if interval.min > interval.max {
+            let Interval { min, max } = interval;
+            return format!(
+                "`{key}`: the bounds of {direction} exclude each other: {min} or more, and {max} or less; change one of them"
+            );
+        }
+        format!("`{key}`: {direction} = {value} is out of its bounds: {interval}; begin within them")
+    }
 }
 
 #[cfg(test)]
@@ -215,8 +237,12 @@ mod tests {
         bounds.insert("x", Interval::new(0.0..).unwrap());
         bounds.insert("x", Interval::new(..=9.0).unwrap());
         assert_eq!(bounds.iter().next(), Some(("x", Interval::new(0.0..=9.0).unwrap())));
+        // added limits apply beside the old ones
+        bounds.restrict("x", Interval::new(-1.0..=2.0).unwrap());
+        assert_eq!(bounds.iter().next(), Some(("x", Interval::new(0.0..=2.0).unwrap())));
         bounds.insert("x", Interval::new(..=-1.0).unwrap());
-        assert_eq!(bounds.iter().next(), Some(("x", Interval::new(..=-1.0).unwrap())));
+        let [(_, interval)] = bounds.iter().collect::<Vec<_>>()[..] else { panic!() };
+        assert_eq!((interval.min, interval.max), (0.0, -1.0));
     }
 
     #[test]

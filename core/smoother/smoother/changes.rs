@@ -123,7 +123,9 @@ impl Smoother {
             self.pending.variables.insert(key.clone(), new);
         }
         for (key, fixed) in factors.fixed().iter().filter(|(key, _)| !values.contains(key.as_str())) {
-            self.fix(key, fixed)?;
+            // in addition to what is fixed
+            let tangent = self.tangent(key.as_str()).unwrap_or_default();
+            self.hold(key, self.held(key) | fixed.bits(tangent));
         }
         let ids = factors.factors().iter().zip(resolved).map(|(entry, resolved)| {
             let number = self.pending.numbers.unwrap_or(self.model.next_factor());
@@ -216,15 +218,29 @@ impl Smoother {
         if !errors.is_empty() {
             return Err(ChangeError::Graph(errors));
         }
-        let held = fixed.bits(tangent);
-        match self.pending.variables.get_mut(key) {
-            Some(new) => new.held = held,
-            None => {
-                let changes = variable.map(|variable| Change::SetHeld { variable, held });
-                self.pending.changes.extend(changes);
-            }
-        }
+        self.hold(key, fixed.bits(tangent));
         Ok(())
+    }
+
+    /// Returns the directions of a variable that are fixed as of the next update, as bits.
+    fn held(&self, key: &Key) -> u32 {
+        if let Some(new) = self.pending.variables.get(key) {
+            return new.held;
+        }
+        let Some(known) = self.model.variable(key.as_str()) else { return 0 };
+        let changed = self.pending.changes.iter().rev().find_map(|change| match change {
+            Change::SetHeld { variable, held } if *variable == known => Some(*held),
+            _ => None,
+        });
+        changed.unwrap_or(self.model.record(known).held)
+    }
+
+    fn hold(&mut self, key: &Key, held: u32) {
+        if let Some(new) = self.pending.variables.get_mut(key) {
+            new.held = held;
+        } else if let Some(variable) = self.model.variable(key.as_str()) {
+            self.pending.changes.push(Change::SetHeld { variable, held });
+        }
     }
 
     /// Moves the estimate of a variable, so that its factors are linearized there. The next

@@ -4,7 +4,7 @@ use crate::toy::{At, Logarithm, Plane, Valley};
 use crate::world::Space;
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::loss::Cauchy;
-use manifactor_graph::{Fixed, Graph, Noise, Values};
+use manifactor_graph::{Fixed, Graph, Key, Noise, Values};
 use manifactor_smoother::{ChangeError, Smoother, SmootherSettings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 use std::num::NonZeroUsize;
@@ -71,6 +71,29 @@ fn a_linearization_stays_in_the_domain_of_its_factors() {
         assert_eq!(smoother.update().unwrap().inactive, 0);
     }
     assert!((smoother.get::<Plane>("p").unwrap().x - 0.5).abs() < 1e-3);
+}
+
+#[test]
+fn a_pushed_graph_holds_in_addition_to_what_is_held() {
+    for in_two_updates in [false, true] {
+        let mut smoother = Smoother::new(SmootherSettings::default());
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        values.insert("p", Plane { x: 2.0, y: 1.0 });
+        graph.add(["p"], At { at: [2.0, 1.0] });
+        graph.fix("p");
+        smoother.push(&graph, &values).unwrap();
+        if in_two_updates {
+            smoother.update().unwrap();
+        }
+        let mut more = Graph::new();
+        more.add(["p"], At { at: [9.0, 9.0] }).noise(Noise::sigma(1e-3).unwrap());
+        more.fix_directions("p", &["x"]);
+        smoother.push(&more, &Values::new()).unwrap();
+        smoother.update().unwrap();
+        let p = smoother.get::<Plane>("p").unwrap();
+        assert_eq!((p.x, p.y), (2.0, 1.0));
+        assert_eq!(smoother.graph().0.fixed().get(&Key::from("p")), Some(&Fixed::Whole(true)));
+    }
 }
 
 #[test]

@@ -46,8 +46,11 @@ impl Optimizer for GaussNewton {
         };
         let mut best = Best::new(&descent);
         let termination = loop {
-            let termination = iterate(&mut descent, &mut best);
-            best.restore(&mut descent);
+            let mut termination = iterate(&mut descent, &mut best);
+            if best.restore(&mut descent) && termination.is_converged() {
+                // the minimum that was reached is higher than an estimate before it
+                termination = Termination::Stalled { reason: Stall::Diverging };
+            }
             if !descent.leave_stationary_point(&termination) {
                 break termination;
             }

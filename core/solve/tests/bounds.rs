@@ -164,6 +164,11 @@ fn bounds_that_do_not_fit_are_errors() {
             "`q` is to have bounds, but there is no such variable",
         ]
     );
+    let mut never = graph.clone();
+    never.bound("p", "x", Interval::new(2.0..).unwrap());
+    never.bound("p", "x", Interval::new(..=1.0).unwrap());
+    let text = "`p`: the bounds of x exclude each other: 2 or more, and 1 or less; change one of them";
+    assert_eq!(errors(&never), [text]);
     graph.bound("p", "x", Interval::new(..=2.0).unwrap());
     let mut problem = Problem::compile(&graph, &values).unwrap();
     let mut outside = Values::new();

@@ -54,6 +54,20 @@ fn the_valley_is_followed_to_its_end() {
 }
 
 #[test]
+fn converged_is_the_estimate_and_not_a_later_one() {
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("p", Plane { x: -1.8, y: 0.0 });
+    graph.add(["p"], TwoMinima {});
+    for solver in solvers() {
+        let solution = run(&graph, &values, &*solver);
+        let converged = solution.outcome.termination.is_converged();
+        assert_eq!(converged, (point(&solution, "p")[0] + 1.177_02).abs() < 1e-4, "{solver:?} {solution:?}");
+        assert_eq!(converged, solver.typetag_name() != "gauss_newton", "{solver:?}");
+        assert!(solution.outcome.final_cost <= solution.outcome.initial_cost);
+    }
+}
+
+#[test]
 fn a_held_variable_stays_and_the_rest_follows() {
     let (mut graph, values) = chain(6);
     graph.fix("p5");

@@ -189,7 +189,11 @@ impl Evaluate {
 
 /// Reads a file that has to be a trajectory.
 fn read_trajectory(path: &Path) -> Result<Trajectory, Failure> {
-    Ok(tum::parse(&read_as(path, kind::TRAJECTORY)?, path)?)
+    let trajectory = tum::parse(&read_as(path, kind::TRAJECTORY)?, path)?;
+    for note in trajectory.notes() {
+        output::print_note(&format!("{}: {note}", path.display()));
+    }
+    Ok(trajectory)
 }
 
 /// Reads a file that has to be a table of detections.

@@ -64,6 +64,8 @@ struct Replayed {
     interrupted: bool,
     /// Number of factors left out because a variable had already left the window.
     left_out: usize,
+    /// Whether old poses leave the smoother.
+    has_window: bool,
 }
 
 impl Replay {
@@ -85,6 +87,13 @@ impl Replay {
                     self.graph.display()
                 ),
                 "use `window.poses`: --set online.window.poses=200",
+            ));
+        }
+        if input.online.window.is_some() && self.destination.is_given() {
+            return Err(Failure::with_help(
+                "--out: with `online.window` the smoother keeps only the last poses and a linear prior, which a graph cannot \
+                 express",
+                "remove the window, or `manifactor solve` the whole graph with --out",
             ));
         }
         input.notes.iter().for_each(|note| output::print_note(note));
@@ -124,7 +133,9 @@ impl Replay {
     fn replay(&self, input: &GraphFile, interrupt: &Interrupt) -> Result<Replayed, Failure> {
         let session = Smoother::new(input.online.clone());
         let report = UpdateReport::default();
-        let mut replayed = Replayed { session, times: vec![], report, interrupted: false, left_out: 0 };
+        let has_window = input.online.window.is_some();
+        let mut replayed =
+            Replayed { session, times: vec![], report, interrupted: false, left_out: 0, has_window };
         let mut steps = Steps::of(&input.graph, &input.values);
         if steps.is_empty() {
             return Err(Failure::with_help(
@@ -184,7 +195,7 @@ impl Replay {
     }
 
     fn print_summary(&self, replayed: &mut Replayed, cost: f64, finished: Option<&Finished>, batch: f64) {
-        let Replayed { session, times, report, interrupted, left_out } = replayed;
+        let Replayed { session, times, report, interrupted, left_out, has_window } = replayed;
         let rejections = session.rejections();
         let latencies = Latencies::of(times);
         let outcome = finished.map(|finished| &finished.outcome);
@@ -217,8 +228,9 @@ impl Replay {
             table.text() + "\n" + &format!("cost {cost:.6} after {}\n", count(times.len(), "pose"));
         if let Some(outcome) = outcome {
             text += &format!(
-                "cost {:.6} after a batch solve of {}: {}\n",
+                "cost {:.6} after a batch solve{} of {}: {}\n",
                 outcome.final_cost,
+                if *has_window { ", with the linear prior of the window," } else { "" },
                 seconds(batch),
                 outcome.termination
             );

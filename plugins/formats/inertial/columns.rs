@@ -39,10 +39,16 @@ pub(super) fn rows<const N: usize>(
     let mut reader =
         ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).flexible(true).from_reader(text.as_bytes());
     let header = reader.headers().cloned().unwrap_or_default();
-    let find = |column: &Column| {
-        header.iter().position(|name| plain(name) == column.name || column.others.contains(&plain(name)))
-    };
-    let places: Vec<Option<usize>> = wanted.iter().map(find).collect();
+    let mut places: Vec<Option<usize>> = vec![];
+    for column in wanted {
+        match find(&header, column) {
+            Ok(place) => places.push(place),
+            Err(mistake) => {
+                problems.push(1, mistake);
+                return vec![];
+            }
+        }
+    }
     let missing = wanted.iter().zip(&places).filter(|(_, place)| place.is_none());
     let missing: Vec<&str> = missing.map(|(column, _)| column.name).collect();
     if !missing.is_empty() {
@@ -74,6 +80,26 @@ pub(super) fn rows<const N: usize>(
         rows.extend(problems.ok(at, numbers(&fields, wanted, scale)).map(|numbers| (at, numbers)));
     }
     rows
+}
+
+/// Returns the place of a column: the one with its own name, otherwise the only one with another name of it.
+fn find(header: &csv::StringRecord, column: &Column) -> Result<Option<usize>, Mistake> {
+    let with = |is: &dyn Fn(&str) -> bool| -> Vec<usize> {
+        header.iter().enumerate().filter(|(_, name)| is(plain(name))).map(|(place, _)| place).collect()
+    };
+    let own = with(&|name| name == column.name);
+    let found = if own.is_empty() { with(&|name| column.others.contains(&name)) } else { own };
+    if found.len() > 1 {
+        let names: Vec<&str> = found.iter().filter_map(|place| header.get(*place)).collect();
+        let message = format!(
+            "the columns {} can all be `{}`: name the right one `{}`, and the others differently",
+            names.join(", "),
+            column.name,
+            column.name
+        );
+        return Err(Mistake::Row(message));
+    }
+    Ok(found.first().copied())
 }
 
 fn numbers<const N: usize>(fields: &[&str], wanted: &[Column; N], scale: f64) -> Result<[f64; N], Mistake> {

@@ -205,7 +205,9 @@ pub(crate) fn array_node(place: &Place, shape: &[usize], values: &[f64], whole: 
 }
 
 pub(crate) fn number(x: f64, whole: bool) -> Value {
-    if whole { Value::Integer(x as i64) } else { Value::Float(x) }
+    // a whole number above the range of integers
+    let is_integer = whole && x.abs() < i64::MAX as f64;
+    if is_integer { Value::Integer(x as i64) } else { Value::Float(x) }
 }
 
 /// Converts a field of an immutable object to a read-only value, so that a change is an error and not lost.

@@ -178,8 +178,8 @@ class Graph:
         dict of one of its forms with an array: `{"sigmas": array}`, shape (n, m). After an error, nothing
         is added."""
     def fix(self, key: _Key, directions: Sequence[str] | None = None) -> None:
-        """Fixes a variable at its initial value, either entirely or only in the given directions of its
-        tangent space, in addition to those that are fixed."""
+        """Fixes a variable at its initial value. With `directions`, no step goes along these directions of its tangent
+        space, in addition to those that are fixed; those of a pose are the axes of its current frame."""
     def free(self, key: _Key) -> None:
         """Removes the constraint of `fix` from a variable."""
     @property
@@ -359,7 +359,8 @@ class Smoother:
     def rejections(self) -> list[dict[str, Any]]:
         """Returns the factors rejected as outliers, each with its cost and the update that rejected it."""
     def graph(self) -> Graph:
-        """Returns the active factors as a graph, with its fixed variables."""
+        """Returns the active factors as a graph, with its fixed variables. The linear priors that marginalized variables
+        leave are not in it, so a solve of it can differ from the estimate; `finish` includes them."""
     def finish(self, solver: Solver | None = None) -> tuple[Values, dict[str, Any]]:
         """Solves the whole graph as one batch from the estimate, and returns the values and the report of
         the solver. The smoother does not change."""

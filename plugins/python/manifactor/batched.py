@@ -113,6 +113,9 @@ class BatchFactor:
         return [*named, *(c.reshape(len(c), *shape) for c, shape in zip(constants, shapes, strict=True))]
 
     def _as_rows(self, returned: Any) -> Array:
+        if np.ma.is_masked(returned):
+            message = "expected an array without masked entries"
+            raise ArgumentError(self.__name__, [Mistake("the residual", message, "`numpy.ma.filled` replaces them")])
         numbers = np.asarray(returned)
         if self.jacobian is None and numbers.dtype in (np.float16, np.float32):
             message = f"expected float64, got {numbers.dtype}, whose finite differences are rounding errors"

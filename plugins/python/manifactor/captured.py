@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sysconfig
 from collections.abc import Callable, Iterator
 from types import CodeType, FunctionType
 from typing import Any
@@ -14,10 +15,28 @@ from .chosen import Variable
 DEEPEST, LONGEST = 4, 1000
 
 
+#: Folders of Python's library and of installed packages, whose functions are not looked into.
+INSTALLED = tuple({sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")})
+
+
+class Same:
+    """An object that is compared by identity."""
+
+    def __init__(self, value: object) -> None:
+        self.value = value
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Same) and self.value is other.value
+
+    def __hash__(self) -> int:
+        return id(self.value)
+
+
 def captured(function: Callable[..., Any]) -> tuple[Any, ...]:
     """Returns the numbers, arrays and values that a function uses besides its arguments, to notice a change.
 
-    The functions of its module that it calls count too; attributes of objects do not."""
+    The functions that it calls count too, but not those of installed packages. Of other objects, a change of the name
+    to another object counts; a change of their attributes does not."""
     found: list[Any] = []
     waiting, seen = [function], {function}
     while waiting:
@@ -27,10 +46,11 @@ def captured(function: Callable[..., Any]) -> tuple[Any, ...]:
         for name, value in used(part).items():
             if not isinstance(value, FunctionType):
                 found.append((name, frozen(value)))
-            elif value.__module__ == function.__module__ and value not in seen:
+                continue
+            found.append((name, value.__code__, frozen(value.__defaults__), frozen(value.__kwdefaults__)))
+            if value not in seen and not value.__code__.co_filename.startswith(INSTALLED):
                 seen.add(value)
                 waiting.append(value)
-                found.append((name, value.__code__))
     return tuple(found)
 
 
@@ -59,9 +79,11 @@ def names(code: CodeType) -> Iterator[str]:
 
 
 def frozen(value: Any, depth: int = 0) -> tuple[Any, ...]:
-    """Returns a value in a form that can be compared; empty for everything that is no number."""
-    if depth > DEEPEST or value is None or isinstance(value, type):
+    """Returns a value in a form that can be compared: numbers and containers by content, other objects by identity."""
+    if value is None:
         return ()
+    if depth > DEEPEST:
+        return (Same(value),)
     if isinstance(value, bool | int | float | complex | np.generic):
         # NaN is equal to itself as a text
         return (repr(value),)
@@ -69,13 +91,15 @@ def frozen(value: Any, depth: int = 0) -> tuple[Any, ...]:
         return (value,)
     if isinstance(value, Variable):
         return (repr(value.to_dict()),)
-    if isinstance(value, list | tuple | dict) and len(value) > LONGEST:
-        return (repr(len(value)),)
+    if isinstance(value, list | tuple | dict | set | frozenset) and len(value) > LONGEST:
+        return (repr(len(value)), Same(value))
     if isinstance(value, list | tuple):
         return ("list", *(frozen(item, depth + 1) for item in value))
+    if isinstance(value, set | frozenset):
+        return ("set", *sorted(repr(item) for item in value))
     if isinstance(value, dict):
         return ("dict", *((repr(key), frozen(item, depth + 1)) for key, item in value.items()))
     if isinstance(value, np.ndarray) or type(value).__module__.startswith("jax"):
         array = np.asarray(value)
-        return () if array.dtype.hasobject else (repr(array.shape), array.dtype.str, array.tobytes())
-    return ()
+        return (Same(value),) if array.dtype.hasobject else (repr(array.shape), array.dtype.str, array.tobytes())
+    return (Same(value),)

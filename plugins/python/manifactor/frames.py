@@ -17,7 +17,12 @@ Array = NDArray[np.float64]
 
 def rotations(quaternions: Array) -> Array:
     """Rotation matrices, shape (n, 3, 3), of unit quaternions (x, y, z, w), shape (n, 4)."""
-    x, y, z, w = np.moveaxis(np.asarray(quaternions, dtype=float), -1, 0)
+    quaternions = np.asarray(quaternions, dtype=float)
+    lengths = np.linalg.norm(quaternions, axis=-1)
+    if not np.all(np.abs(lengths - 1) < 1e-3):
+        message = f"expected unit quaternions (x, y, z, w), got lengths from {lengths.min():g} to {lengths.max():g}"
+        raise ArgumentError("rotations", [Mistake("quaternions", message, "divide them by their lengths")])
+    x, y, z, w = np.moveaxis(quaternions, -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],

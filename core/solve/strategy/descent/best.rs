@@ -18,11 +18,15 @@ impl Best {
             self.columns.clone_from(descent.problem.model.columns());
         }
     }
-    /// Restores the best estimate, unless it is the last one.
-    pub(crate) fn restore(self, descent: &mut Descent<'_>) {
+    /// Restores the best estimate, unless it is the last one. Returns whether its cost is lower by more than the
+    /// tolerance: then what holds at the last estimate need not hold at this one.
+    pub(crate) fn restore(self, descent: &mut Descent<'_>) -> bool {
         if self.cost < descent.at.cost || !descent.at.cost.is_finite() {
+            let is_elsewhere = !descent.is_small(descent.at.cost - self.cost);
             descent.problem.model.restore(self.columns);
             descent.at = descent.problem.linearize();
+            return is_elsewhere;
         }
+        false
     }
 }

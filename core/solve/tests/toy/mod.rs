@@ -4,7 +4,7 @@ use manifactor_graph::{
     Dimension, Jacobians, Jet, JetOf, Lifted, List, Manifold, Many, Refs, Residual, Scalar, register_factor,
     register_manifold,
 };
-use nalgebra::{Matrix2, U1, U2, Vector1, Vector2};
+use nalgebra::{Matrix2, U1, U2, U3, Vector1, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -177,6 +177,18 @@ impl Residual for WrongSign {
     }
 }
 register_factor!("toy_wrong_sign", WrongSign);
+
+/// r = (atan(2.5 x) + 2.1, x / 10 - 2.1): from x = -1.8, Gauss-Newton goes to a local minimum above its start.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+pub struct TwoMinima {}
+impl Residual for TwoMinima {
+    type Variables = (Plane,);
+    type Dim = U3;
+    fn residual<T: Scalar>(&self, (p,): Lifted<Self::Variables, T>) -> Vector3<T> {
+        Vector3::new((p.x * 2.5).atan() + T::from(2.1), p.x * 0.1 - T::from(2.1), p.y)
+    }
+}
+register_factor!("toy_two_minima", TwoMinima);
 
 /// r = x + 1, and NaN for x ≤ 0, without `is_defined`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]

@@ -9,6 +9,7 @@ use manifactor::config::{Diagnostic, Fault, SourceText};
 use manifactor::slam::output::OutputFolder;
 use manifactor::slam::recording;
 use manifactor::slam::run::Run as Running;
+use manifactor::slam::sequence::Sequence;
 use manifactor::slam::source::format_line;
 use std::path::PathBuf;
 
@@ -39,6 +40,10 @@ impl Simulate {
             let problem = Fault::invalid("there is no variant to simulate");
             return Err(Failure::Documents(Diagnostic::new(source.place(0..0), problem).into()));
         };
+        if document.variants.len() > 1 {
+            let (first, n) = (&variant.name, document.variants.len());
+            output::print_note(&format!("written is the source of the first variant, {first}, of {n}"));
+        }
         let sequence = || Running::new(&document, self.run.data()).sequence(variant);
         let Some(out) = &self.out else {
             sequence()?.observations().for_each(|frame| output::print(&(format_line(&frame) + "\n")));
@@ -48,6 +53,7 @@ impl Simulate {
         let _claimed = OutputFolder::claim(out, "simulate", &self.run.config, self.force)?;
         let sequence = sequence()?;
         recording::write(&sequence, out)?;
+        omissions(&sequence).iter().for_each(|omission| output::print_note(omission));
         let objects = sequence.ground_truth.as_ref().map_or(0, |truth| truth.objects.len());
         output::print(&format!(
             "{}, {}, {} written to {}\n",
@@ -57,5 +63,31 @@ impl Simulate {
             out.display()
         ));
         Ok(Status::Done)
+    }
+}
+
+/// Returns notes about parts of a sequence that the files do not hold.
+fn omissions(sequence: &Sequence) -> Vec<String> {
+    let steps = sequence.frames.iter().filter(|frame| frame.odometry_noise.is_some()).count();
+    let parts = [
+        (sequence.pose_factors.len(), "factor on poses", "`--lines` keeps them"),
+        (sequence.accelerometer.len(), "reading of the accelerometer", "`--lines` keeps them"),
+        (steps, "step of the odometry with its own noise", "`--lines` keeps them"),
+        (usize::from(sequence.up.is_some()), "up direction", "write `up` in the source of the new document"),
+        (
+            usize::from(sequence.georeference.is_some()),
+            "place on the Earth",
+            "positions are those in the local frame",
+        ),
+    ];
+    let parts = parts.into_iter().filter(|(n, ..)| *n > 0);
+    parts.map(|(n, what, remedy)| format!("the files do not hold {}: {remedy}", plural(n, what))).collect()
+}
+
+/// Returns `1 factor on poses`, `2 factors on poses`.
+fn plural(n: usize, what: &str) -> String {
+    match what.split_once(' ') {
+        Some((noun, rest)) if n != 1 => format!("{} {rest}", count(n, noun)),
+        _ => format!("{n} {what}"),
     }
 }

@@ -84,7 +84,7 @@ impl Vio {
         &self,
         estimate: &VisualInertialEstimate,
         seconds: f64,
-        errors: Option<[f64; 2]>,
+        errors: Option<[(f64, usize); 2]>,
         warnings: &[String],
         out: &Path,
     ) {
@@ -98,8 +98,9 @@ impl Vio {
                 "milliseconds_per_keyframe": milliseconds,
                 "termination": outcome.termination,
                 "final_cost": outcome.final_cost,
-                "online_ate": errors.map(|errors| errors[0]),
-                "ate": errors.map(|errors| errors[1]),
+                "online_ate": errors.map(|[(online, _), _]| online),
+                "ate": errors.map(|[_, (ate, _)]| ate),
+                "keyframes_with_truth": errors.map(|[_, (_, pairs)]| pairs),
                 "warnings": warnings,
             }));
             return;
@@ -111,8 +112,12 @@ impl Vio {
             count(*short_tracks, "track"),
             outcome.termination
         );
-        if let Some([online, whole]) = errors {
-            text += &format!("ATE {:.2} cm online, {:.2} cm for the batch\n", 100.0 * online, 100.0 * whole);
+        if let Some([(online, _), (whole, pairs)]) = errors {
+            text += &format!("ATE {:.2} cm online, {:.2} cm for the batch", 100.0 * online, 100.0 * whole);
+            text += &match pairs == states.len() {
+                true => "\n".to_owned(),
+                false => format!(", of the {pairs} of {} keyframes with a true pose\n", states.len()),
+            };
         }
         warnings.iter().for_each(|warning| text += &format!("warning: {warning}\n"));
         output::print(&(text + &format!("Written to {}\n", out.display())));
@@ -147,7 +152,14 @@ pub(super) fn read(path: &Path, set: &[String]) -> Result<VisualInertialDocument
 /// Reads true poses, from CSV as in EuRoC or in the TUM format.
 fn read_truth(path: &Path) -> Result<Vec<StampedPose>, Failure> {
     let is_csv = path.extension().is_some_and(|extension| extension == "csv");
-    Ok(if is_csv { read_states(path)? } else { tum::read(path)?.poses })
+    if is_csv {
+        return Ok(read_states(path)?);
+    }
+    let truth = tum::read(path)?;
+    for note in truth.notes() {
+        output::print_note(&format!("{}: {note}", path.display()));
+    }
+    Ok(truth.poses)
 }
 
 /// Returns all images, with pixels.
@@ -177,7 +189,14 @@ fn estimate(
     let VisualInertialDocument { settings, camera, body_from_camera, .. } = document;
     // the first image with readings before it
     let begins = readings.first().map_or(f64::INFINITY, |reading| reading.timestamp);
-    let mut keyframes = keyframes.iter().skip_while(|(timestamp, _)| *timestamp < begins);
+    let early = keyframes.iter().take_while(|(timestamp, _)| *timestamp < begins).count();
+    if early > 0 {
+        output::print_note(&format!(
+            "{} before the first reading of the IMU: not used",
+            count(early, "keyframe")
+        ));
+    }
+    let mut keyframes = keyframes.iter().skip(early);
     let Some((timestamp, points)) = keyframes.next() else {
         return Err(Failure::with_help(
             "no image lies within the readings of the IMU",
@@ -212,11 +231,12 @@ fn states(states: &[InertialState]) -> String {
     text
 }
 
-/// Returns the absolute trajectory error after alignment by a rigid motion, in metres.
-fn error(truth: &[StampedPose], states: &[InertialState]) -> Result<f64, MetricsError> {
+/// Returns the absolute trajectory error after alignment by a rigid motion, in metres, and the number of poses that it
+/// covers.
+fn error(truth: &[StampedPose], states: &[InertialState]) -> Result<(f64, usize), MetricsError> {
     /// Largest time difference between two matched poses, in seconds.
     const WITHIN: f64 = 0.02;
     let pairs = associate(truth, &trajectory(states), WITHIN)?;
     let (_, pairs) = align(&pairs, Alignment::Se3)?;
-    Ok(absolute_error(&pairs)?.rmse)
+    Ok((absolute_error(&pairs)?.rmse, pairs.len()))
 }

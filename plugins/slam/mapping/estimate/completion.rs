@@ -125,9 +125,11 @@ impl Estimate {
             })
         };
         let mut starts: Vec<_> = measurements.objects.iter().map(start).collect();
+        let first: Vec<_> =
+            measurements.objects.iter().map(|measured| object_key(measured.id)).zip(starts.clone()).collect();
         let mut refine = true;
         loop {
-            let fitted = self.fit_from(settings, &measurements, starts, refine, observer)?;
+            let mut fitted = self.fit_from(settings, &measurements, starts, refine, observer)?;
             let (mut is_settled, mut untouched) = (true, 0);
             let mut check = |(object, measured): (&MappedObject, &mut ObjectMeasurements)| {
                 if let Some(rejection) = &object.rejected {
@@ -141,6 +143,13 @@ impl Estimate {
             };
             starts = fitted.mapping.objects.iter().zip(&mut measurements.objects).map(&mut check).collect();
             if fitted.interrupted || is_settled {
+                // the values before the first stage, which reports compare with the estimate; later ones are fitted
+                for (key, quadric) in first.into_iter().filter_map(|(key, start)| Some((key, start.ok()?))) {
+                    let before = self.mapping.values.get(&key).ok().copied();
+                    if fitted.mapping.values.contains(key.as_str()) {
+                        fitted.mapping.values.insert(key, before.unwrap_or(quadric));
+                    }
+                }
                 return Ok(fitted);
             }
             measurements.untouched += untouched;

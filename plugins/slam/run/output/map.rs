@@ -145,8 +145,8 @@ fn restore_written_covariances(graph: &mut Graph, estimate: &Estimate) {
     }
 }
 
-/// Returns the covariance of each object by key. Undetermined directions get the standard deviations of
-/// `UNOBSERVED_SIGMAS`.
+/// Returns the covariance of each object by key. Directions that are known worse than `UNOBSERVED_SIGMAS` get those
+/// standard deviations; the rest is the marginal covariance.
 fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, MapError> {
     let (mut graph, values) = (estimate.mapping.graph.clone(), &estimate.solution.values);
     let keys: HashSet<&str> = estimate.mapping.mapped().map(|object| object.key.as_str()).collect();
@@ -175,12 +175,35 @@ fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, Ma
     let all = problem.marginals()?;
     let of_objects = all.into_iter().filter(|(key, _)| keys.contains(&key.as_str()));
     let entries = |m: DMatrix<f64>| std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]));
-    Ok(of_objects.map(|(key, covariance)| (key.to_string(), entries(covariance))).collect())
+    Ok(of_objects
+        .map(|(key, covariance)| (key.to_string(), entries(without_weak_prior(&covariance))))
+        .collect())
+}
+
+/// Removes the weak prior from the covariance of an object, and limits it to `UNOBSERVED_SIGMAS`. In their units, a
+/// variance v with the prior is v / (1 - v) without it.
+fn without_weak_prior(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let scale = |r: usize, c: usize| UNOBSERVED_SIGMAS[r] * UNOBSERVED_SIGMAS[c];
+    let scaled = DMatrix::from_fn(9, 9, |r, c| covariance[(r, c)] / scale(r, c));
+    let mut eigen = scaled.symmetric_eigen();
+    eigen.eigenvalues.apply(|v| *v = if *v < 0.5 { *v / (1.0 - *v) } else { 1.0 });
+    let limited = eigen.recompose();
+    DMatrix::from_fn(9, 9, |r, c| 0.5 * (limited[(r, c)] + limited[(c, r)]) * scale(r, c))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_determined_keeps_its_covariance() {
+        // information 4 about one axis, none about another
+        let mut covariance = DMatrix::from_diagonal_element(9, 9, 1e-4);
+        (covariance[(0, 0)], covariance[(1, 1)]) = (1.0 / (4.0 + 1.0), 1.0);
+        let written = without_weak_prior(&covariance);
+        assert!((written[(0, 0)] - 0.25).abs() < 1e-12 && (written[(1, 1)] - 1.0).abs() < 1e-12, "{written}");
+        assert!((written[(8, 8)] / 1e-4 - 1.0).abs() < 2e-4 && (written[(3, 3)] / 1e-4 - 1.0).abs() < 1e-5);
+    }
 
     #[test]
     fn few_detections_of_a_reliable_object_are_those_of_other_objects() {
