@@ -1,4 +1,5 @@
 //! Each command: its arguments and its results.
+mod bundle;
 mod check;
 mod documents;
 pub(crate) mod experiment;

@@ -217,6 +217,12 @@ impl Expected {
         }
         Err(match InputKind::of_folder(path) {
             Some(kind) => kind.refused(path, self.name),
+            None if path.join("images.bin").is_file() => {
+                let message =
+                    format!("{} is a COLMAP model in its binary form; expected text", path.display());
+                let help = "`colmap model_converter --input_path IN --output_path OUT --output_type TXT` converts it";
+                Failure::with_help(message, help)
+            }
             None => {
                 let message = format!("{} is a folder; expected {}", path.display(), self.name);
                 Failure::NotThere { message, help: Some("give a file".to_owned()) }

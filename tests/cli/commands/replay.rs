@@ -136,6 +136,11 @@ fn a_window_leaves_old_poses_behind() {
     let keeps =
         format!("replay {graph} --set online.window.poses=5 --set online.window.keep=[\"dual_quadrik\"]");
     manifactor(&keeps).ended(2).complains("did you mean `dual_quadric`?");
+    let out = path(&folder, "end.toml");
+    let written = manifactor(&format!("replay {graph} --set online.window.poses=5 --out {out}"));
+    written.ended(2).complains("a linear prior, which a graph cannot express");
+    let text = manifactor(&format!("replay {graph} --set online.window.poses=5")).ended(0).stdout;
+    assert!(text.contains("with the linear prior of the window"), "{text}");
 }
 
 #[test]

@@ -186,3 +186,32 @@ fn a_name_that_is_too_long_for_a_folder_is_refused_before_the_run() {
         .ended(2)
         .complains("names a folder, and is longer than 200 letters");
 }
+
+#[test]
+fn initial_values_are_those_before_the_solve() {
+    let run = "source = { type = 'simulated', scene = { objects = 5 }, trajectory = { frames = 40 } }\n";
+    let folder = folder(&[("run.toml", run)]);
+    let error = |name: &str, more: &str| {
+        let (document, out) = (path(&folder, "run.toml"), path(&folder, name));
+        let json = manifactor(&format!("run {document} --out {out} {more} --json")).json();
+        let landmarks = &json["variants"][0]["landmarks"];
+        ["initial", "estimate"].map(|when| landmarks[when]["rmse"]["position"].as_f64().unwrap())
+    };
+    let [initial, estimate] = error("with", "");
+    let [without, _] = error("without", "--set completion.enabled=false");
+    // the second stage maps the same objects
+    assert!((initial - without).abs() < 1e-9 && initial > 1.5 * estimate, "{initial} {estimate} {without}");
+}
+
+#[test]
+fn what_files_cannot_hold_is_said_when_they_are_written() {
+    let folder = folder(&[]);
+    let out = path(&folder, "recording");
+    let ran = manifactor(&format!(
+        "simulate examples/desk/desk.toml --out {out} {SMALL} --set source.accelerometer={{}}"
+    ));
+    ran.ended(0).complains("the files do not hold");
+    let names =
+        manifactor("simulate examples/desk/desk.toml --lines --set source.trajectory.frames=2").ended(0);
+    names.complains("written is the source of the first variant");
+}

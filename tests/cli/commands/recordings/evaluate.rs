@@ -31,6 +31,15 @@ fn the_table_names_its_units() {
 }
 
 #[test]
+fn lines_that_are_late_or_repeat_a_timestamp_are_counted() {
+    let folder = folder(&[("truth.txt", &format!("{TRUTH}3 50 0 0 0 0 0 1\n2.97 0 1 0.5 0 0 0 1\n"))]);
+    let file = path(&folder, "truth.txt");
+    let ran = manifactor(&format!("evaluate {file} {file}")).ended(0);
+    ran.complains("1 line (5) with the timestamp of an earlier line: left out; the first line counts");
+    ran.complains("1 line (6) late: moved to their place by time");
+}
+
+#[test]
 fn clocks_that_do_not_meet_are_an_error() {
     let folder = folder(&[("truth.txt", TRUTH), ("late.txt", "100 0 0 0 0 0 0 1\n")]);
     let ran = manifactor(&format!("evaluate {} {}", path(&folder, "truth.txt"), path(&folder, "late.txt")));

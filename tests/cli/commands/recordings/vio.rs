@@ -87,6 +87,13 @@ fn mistakes_of_a_recording_are_named() {
         tracks.lines().take(1).chain(tracks.lines().skip(4000)).map(|l| format!("{l}\n")).collect();
     let late = late.replacen("\n", "\n1000,1,3,4\n", 1);
     complaint(&imu, &late, &document, "time stamps have to increase");
+    let both = tracks.replacen("u,v", "x,px,v", 1);
+    complaint(&imu, &both, &document, "the columns x, px can all be `u`");
+    let many = tracks.replacen("\n", "\n0.1,9007199254740993,3,4\n", 1);
+    complaint(&imu, &many, &document, "from 0 to 9007199254740991");
+    let window =
+        document.replace("output =", "settings = { smoother = { window = { poses = 30 } } }\noutput =");
+    complaint(&imu, &tracks, &window, "remove `settings.smoother.window`");
     let moving = imu.lines().take(1).chain(imu.lines().skip(600)).collect::<Vec<_>>().join("\n");
     complaint(&moving, &tracks, &document, "begin where it is at rest");
     complaint(&imu, &tracks, &document.replace("ground_truth", "groundtruth"), "ground_truth");
@@ -96,4 +103,28 @@ fn mistakes_of_a_recording_are_named() {
         &document.replace("output =", "settings = { sigma = -1.0 }\noutput ="),
         "expected a finite number above zero",
     );
+}
+
+#[test]
+fn an_error_of_a_part_and_unused_images_are_said_to_be_so() {
+    let [imu, tracks, truth, document] = files();
+    let part = truth.lines().take(20).map(|line| format!("{line}\n")).collect::<String>();
+    // the header and the first readings, up to after the first image
+    let later: String =
+        imu.lines().take(1).chain(imu.lines().skip(30)).map(|line| format!("{line}\n")).collect();
+    // a column with another name of `u` does not replace it
+    let named: String = tracks
+        .lines()
+        .map(|line| match line.split(',').collect::<Vec<_>>()[..] {
+            ["timestamp", ..] => "timestamp,landmark,x,u,v\n".to_owned(),
+            [time, landmark, u, v] => format!("{time},{landmark},7,{u},{v}\n"),
+            _ => panic!("{line}"),
+        })
+        .collect();
+    let files = [("imu.csv", &*later), ("tracks.csv", &named), ("truth.csv", &part), ("vio.toml", &document)];
+    let folder = folder(&files);
+    let ran =
+        manifactor(&format!("vio {} --out {}", path(&folder, "vio.toml"), path(&folder, "out"))).ended(0);
+    ran.complains("before the first reading of the IMU: not used");
+    assert!(ran.stdout.contains("keyframes with a true pose"), "{}", ran.stdout);
 }
