@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 mod associate;
 mod auto;
+mod cameras;
 mod formulas;
 mod kitti;
 mod linearise_boxes;
@@ -29,6 +30,7 @@ pub(crate) fn run(mut arguments: Arguments) -> ExitCode {
     let result = match name.as_str() {
         "associate" => associate::run(arguments),
         "auto" => auto::run(arguments),
+        "cameras" => cameras::run(),
         "formulas" => formulas::run(),
         "kitti" => kitti::run(arguments),
         "linearise_boxes" => linearise_boxes::run(),

@@ -1,7 +1,7 @@
 //! Pinhole cameras without distortion.
 use crate::{CameraModel, Se3, register_camera};
 use manifactor_graph::Scalar;
-use nalgebra::{Matrix2x3, Matrix3, Matrix3x4, U4, Vector2, Vector3, Vector4};
+use nalgebra::{Matrix2x3, Matrix2x4, Matrix3, Matrix3x4, U4, Vector2, Vector3, Vector4};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -167,6 +167,12 @@ impl CameraModel for Camera {
         let Self { fx, fy, skew, .. } = *self;
         let (x, y, w) = (point.x / point.z, point.y / point.z, point.z.recip());
         Matrix2x3::new(fx, skew, -(fx * x + skew * y), 0.0, fy, -fy * y) * w
+    }
+
+    #[inline(always)]
+    fn derivative_by_intrinsics(&self, point: &Vector3<f64>) -> Matrix2x4<f64> {
+        let (x, y) = (point.x / point.z, point.y / point.z);
+        Matrix2x4::new(x, 0.0, 1.0, 0.0, 0.0, y, 0.0, 1.0)
     }
 }
 

@@ -1,8 +1,8 @@
 //! Interface of camera models: a model is one file that implements [`CameraModel`] and ends with
 //! `register_camera!`.
 use crate::{Camera, Point3};
-use manifactor_graph::{Dimension, Jet, JetOf, Manifold, Scalar, Vector};
-use nalgebra::{Matrix2x3, U3, Vector2, Vector3};
+use manifactor_graph::{Block, Dimension, Jet, JetOf, Lift, Manifold, Matrix, Scalar, Vector};
+use nalgebra::{Matrix2x3, U2, U3, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -62,6 +62,22 @@ pub trait CameraModel:
             if let Some(gradient) = JetOf::<U3>::gradient(coordinate) {
                 derivative.row_mut(i).copy_from_slice(gradient);
             }
+        }
+        derivative
+    }
+
+    /// Returns the derivative of [`project`](Self::project) with respect to the intrinsics. The default uses dual
+    /// numbers; a model can override it.
+    #[inline]
+    fn derivative_by_intrinsics(&self, point: &Vector3<f64>) -> Matrix<U2, Self::Dim> {
+        let intrinsics = self.intrinsics();
+        let unit = |i: usize| Self::Dim::vector(|k| if k == i { 1.0 } else { 0.0 });
+        let jet = |i: usize| JetOf::<Self::Dim>::with_gradient(intrinsics.as_ref()[i], unit(i).as_ref());
+        let pixel = self.project_with(&Self::Dim::vector(jet), &point.lift());
+        let mut derivative = Matrix::<U2, Self::Dim>::zeros();
+        for (row, coordinate) in pixel.iter().enumerate() {
+            let entries = derivative.as_mut_slice().iter_mut().skip(row).step_by(2);
+            entries.zip(coordinate.gradient().unwrap_or_default()).for_each(|(entry, slope)| *entry = *slope);
         }
         derivative
     }

@@ -2,7 +2,7 @@
 use crate::bundle::radial_tangential::smallest_root;
 use crate::{Camera, CameraError, CameraModel, Coordinates, RadialTangential, register_camera};
 use manifactor_graph::Scalar;
-use nalgebra::{U5, Vector2, Vector3, Vector5};
+use nalgebra::{Matrix2x3, Matrix2x5, U5, Vector2, Vector3, Vector5};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -112,6 +112,37 @@ impl CameraModel for Radial {
 
     fn pinhole(&self) -> Camera {
         self.pinhole
+    }
+
+    #[inline]
+    fn derivative(&self, point: &Vector3<f64>) -> Matrix2x3<f64> {
+        let (f, p, [k1, k2]) = (self.pinhole.fx, point.xy() / point.z, self.distortion);
+        let rho = p.norm_squared();
+        // ∂u/∂p = f (radial I + 2 (k1 + 2 k2 ρ) p pᵀ), ∂p/∂P = [I -p] / z
+        let (radial, slope) = (1.0 + rho * (k1 + rho * k2), 2.0 * (k1 + 2.0 * k2 * rho));
+        let scale = f / point.z;
+        let (xx, yy) = (scale * (radial + slope * p.x * p.x), scale * (radial + slope * p.y * p.y));
+        let xy = scale * slope * p.x * p.y;
+        Matrix2x3::new(xx, xy, -(xx * p.x + xy * p.y), xy, yy, -(xy * p.x + yy * p.y))
+    }
+
+    #[inline]
+    fn derivative_by_intrinsics(&self, point: &Vector3<f64>) -> Matrix2x5<f64> {
+        let (f, p, [k1, k2]) = (self.pinhole.fx, point.xy() / point.z, self.distortion);
+        let rho = p.norm_squared();
+        let (radial, by_k1, by_k2) = (1.0 + rho * (k1 + rho * k2), f * rho, f * rho * rho);
+        Matrix2x5::new(
+            p.x * radial,
+            1.0,
+            0.0,
+            p.x * by_k1,
+            p.x * by_k2, //
+            p.y * radial,
+            0.0,
+            1.0,
+            p.y * by_k1,
+            p.y * by_k2,
+        )
     }
 }
 

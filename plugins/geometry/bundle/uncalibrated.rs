@@ -3,7 +3,6 @@ use super::projection::{derive, seen};
 use crate::bundle::camera_model::CameraNames;
 use crate::{CameraModel, Coordinates, Intrinsics, Point3, Se3};
 use manifactor_graph::prelude::*;
-use manifactor_graph::{Block, Jet};
 use std::marker::PhantomData;
 
 /// A camera with unknown intrinsics measures a point at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
@@ -68,12 +67,7 @@ impl<M: CameraModel> Residual for UncalibratedProjection<M> {
         let mounting = self.body_from_camera.as_ref();
         let seen = seen(pose, point, mounting);
         derive(intrinsics.0.derivative(&seen), (pose, point), mounting, by_pose, by_point);
-        let seeded = intrinsics.seed().project(&seen.lift());
-        for (row, coordinate) in seeded.iter().enumerate() {
-            let gradient = coordinate.gradient().unwrap_or_default();
-            let entries = by_intrinsics.as_mut_slice().iter_mut().skip(row).step_by(2);
-            entries.enumerate().for_each(|(k, entry)| *entry = gradient.get(k).copied().unwrap_or(0.0));
-        }
+        *by_intrinsics = intrinsics.0.derivative_by_intrinsics(&seen);
         intrinsics.0.project(&seen) - *self.pixel
     }
 }
