@@ -113,8 +113,9 @@ def load(
     model, as text.
 
     `repair` selects the treatment of information matrices that are not positive definite: `"error"`,
-    `"reject"` or `"clamp"`. `anchor` fixes the first pose if nothing in the file fixes the gauge. `lenient`
-    skips lines with unknown tags, which are an error otherwise.
+    `"reject"` or `"clamp"`. `anchor` fixes the first pose (in bundle adjustment also the scale) if nothing
+    in the file fixes the gauge; documents stay as they are. `lenient` skips lines with unknown tags, which are an error
+    otherwise.
     """
     graph, values, _ = _read(path, repair=repair, anchor=anchor, lenient=lenient)
     return graph, values

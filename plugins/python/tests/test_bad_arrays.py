@@ -167,3 +167,9 @@ def test_a_mistake_says_what_to_do() -> None:
     assert places["camera.hight"].help is not None and "did you mean `height`?" in places["camera.hight"].help
     with pytest.raises(mf.ArgumentError, match="unknown factor `betwen_se3`.*did you mean `between_se3`"):
         mf.Factor("betwen_se3")
+
+
+def test_whole_numbers_above_the_range_of_integers_keep_their_size() -> None:
+    for value in (2**64 - 1, 2**63, 2**63 - 1):
+        array = np.array([value], dtype=np.uint64)
+        assert mf.Point1(position=array).position[0] == float(value)

@@ -301,3 +301,14 @@ def test_a_formula_uses_the_present_numbers_of_its_function() -> None:
         graph.add("a", scaled(m=m))
     at = mf.Point1(position=[1.0])
     assert [graph[i].factor.residual(at)[0] for i in range(3)] == [0, -2, -6]
+
+
+def test_a_masked_residual_is_refused() -> None:
+    @mf.batch(rows=1)
+    def masked(p: mf.Point1) -> Any:
+        return np.ma.masked_array(p, mask=True)
+
+    graph, values = mf.Graph(), mf.Values({"p": mf.Point1(position=[1])})
+    graph.add_many(masked, [["p"]])
+    with pytest.raises(mf.ManifactorError, match="expected an array without masked entries"):
+        mf.solve(graph, values)

@@ -60,6 +60,14 @@ def test_bounds_are_part_of_a_graph() -> None:
     assert not graph.bounds
 
 
+def test_a_sum_of_graphs_has_the_bounds_of_both() -> None:
+    a, b = mf.Graph(), mf.Graph()
+    a.bound("p", "x", min=0, max=3)
+    b.bound("p", "x", min=-1, max=2)
+    for both in (a + b, b + a):
+        assert dict(both.bounds) == {"p": {"x": (0.0, 2.0)}}
+
+
 def test_bounds_that_do_not_fit_are_errors() -> None:
     graph, values = mf.Graph(), mf.Values({"p": mf.Point2(position=[3, 4])})
     graph.add(["p"], mf.prior_point2(value=mf.Point2(position=[0, 0])))
@@ -69,6 +77,9 @@ def test_bounds_that_do_not_fit_are_errors() -> None:
         graph.bound("p", "x")
     graph.bound("p", "x", max=1)
     with pytest.raises(mf.GraphError, match="`p`: x = 3 is out of its bounds: 1 or less"):
+        mf.solve(graph, values)
+    graph.bound("p", "x", min=2)
+    with pytest.raises(mf.GraphError, match="the bounds of x exclude each other: 2 or more, and 1 or less"):
         mf.solve(graph, values)
     with pytest.raises(mf.ManifactorError, match="`p` has bounds, and the smoother has none"):
         mf.Smoother().push(graph, values)

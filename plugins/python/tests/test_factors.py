@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fractions
 import inspect
 import subprocess
 import sys
@@ -326,3 +327,40 @@ def test_what_makes_a_factor_is_to_be_called() -> None:
         graph.add("q0", stands(), loss=mf.huber)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"loss: expected a loss, got str$"):
         graph.add("q0", stands(), loss="huber")  # type: ignore[arg-type]
+
+
+TABLE: Any = {1, 2}
+
+
+def scaled(x: Any, by: float = 1.0) -> Any:
+    return x * by
+
+
+def test_a_formula_is_made_again_if_a_name_has_another_object() -> None:
+    global TABLE
+
+    @mf.factor
+    def uses(p: mf.Point1) -> Any:
+        return scaled(p[0]) * sum(float(item) for item in TABLE)
+
+    values = mf.Values({"p": mf.Point1(position=[1])})
+
+    def residual() -> float:
+        graph = mf.Graph()
+        graph.add(["p"], uses())
+        return float(np.sqrt(2 * graph.cost(values)))
+
+    assert residual() == pytest.approx(3)
+    for table, expected in [({5}, 5.0), ((fractions.Fraction(1, 2),), 0.5), (frozenset({7, 8}), 15.0)]:
+        TABLE = table
+        assert residual() == pytest.approx(expected)
+    scaled.__defaults__ = (2.0,)
+    try:
+        assert residual() == pytest.approx(30)
+    finally:
+        scaled.__defaults__ = (1.0,)
+
+
+def test_rotations_are_of_unit_quaternions() -> None:
+    with pytest.raises(mf.ArgumentError, match="expected unit quaternions"):
+        mf.rotations(np.array([[0.0, 0, 0, 2]]))

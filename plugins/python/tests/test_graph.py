@@ -179,6 +179,23 @@ def test_a_graph_is_saved_and_loaded(tmp_path: Path, extension: str) -> None:
     assert read.fixed == {"x0": ["x", "theta"]} and read_values["x3"] == values["x3"]
 
 
+def test_a_model_of_colmap_is_loaded_and_saved(tmp_path: Path) -> None:
+    model = Path(__file__).parents[3] / "examples/bundle"
+    graph, values = mf.load(model)
+    assert values.types() == {"point3": 80, "radial": 1, "se3": 12}
+    solution = mf.solve(graph, values)
+    camera = solution.values["camera1"]
+    assert abs(camera.f - 700) < 10 and camera.cx == 320
+    mf.save(tmp_path / "out", graph, solution.values, like=model)
+    again, start = mf.load(tmp_path / "out")
+    assert again.cost(start) == pytest.approx(solution.cost, rel=1e-9)
+    assert "frame_03.jpg" in (tmp_path / "out/images.txt").read_text()
+    with pytest.raises(mf.ManifactorError, match="exists already"):
+        mf.save(tmp_path / "out", graph, values, like=model)
+    mf.save(tmp_path / "own", graph, solution.values)
+    assert mf.load(tmp_path / "own")[0].types() == graph.types()
+
+
 def test_a_graph_of_another_format(tmp_path: Path) -> None:
     (tmp_path / "a.g2o").write_text("VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0.1 1 0 0 1 0 1\n")
     graph, values = mf.load(tmp_path / "a.g2o")

@@ -249,6 +249,10 @@ pub(super) fn read_ground_truth(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Cameras;
+    use manifactor_geometry::Se3;
+    use manifactor_quadric::Camera;
+
     const TIMES: [f64; 3] = [1.0, 2.0, 3.0];
 
     #[test]
@@ -258,5 +262,43 @@ mod tests {
         assert_eq!([found(2.4), found(2.6), found(0.9)], [Some((1, 4.0)), Some((2, 4.0)), Some((0, 1.0))]);
         assert_eq!(found(9.0), Some((2, 60.0)));
         assert_eq!(nearest(&[], 1.0), None);
+    }
+
+    #[test]
+    fn images_that_share_a_pose_and_boxes_that_repeat_are_reported() {
+        let poses = TIMES.map(|timestamp| StampedPose { timestamp, pose: Se3::identity() });
+        let camera = Camera::new([500.0, 500.0, 320.0, 240.0], 640, 480).unwrap();
+        let camera = Cameras::from(camera).first().clone();
+        let row = |time: f64, left: f64| {
+            let sides = BoundingBox::new([left, 10.0, left + 50.0, 60.0]).unwrap();
+            (time, Detection::new(camera.clone(), sides, ClassScores::single("cup", 0.5)))
+        };
+        let read = |rows: &[(f64, Detection)], within: f64| {
+            let by = TimeMatching {
+                within: NotNegative::new(within).unwrap(),
+                without_pose: Share::new(1.0).unwrap(),
+                max_pose_gap: None,
+            };
+            let images = rows.iter().map(|(time, _)| *time).collect();
+            let (_, boxes, unused) =
+                match_by_time(&poses, images, rows.to_vec(), by, [Path::new("a"), Path::new("b")]).unwrap();
+            (boxes.len(), unused)
+        };
+        // three images at the first two poses, one of them with two boxes
+        let rows = [row(0.9, 10.0), row(1.1, 20.0), row(1.1, 30.0), row(2.0, 10.0)];
+        let (boxes, unused) = read(&rows, 0.2);
+        assert_eq!(boxes, 4);
+        let [UnusedInput::Recording(text)] = &unused[..] else { panic!("{unused:?}") };
+        assert!(text.starts_with("1 images have the same nearest pose"), "{text}");
+        assert_eq!(read(&rows[1..], 0.2), (3, vec![]));
+        // the second one overlaps by 2/3, the last ones by 1 and 0.92
+        let rows = [row(1.0, 10.0), row(1.0, 20.0), row(1.0, 10.0), row(1.0, 8.0)];
+        let (boxes, unused) = read(&rows, 0.2);
+        let repeated = |place: usize, overlap: &str| UnusedInput::Box {
+            timestamp: 1.0,
+            place,
+            fault: format!("it shows what box 1 shows: the class is the same, and they overlap by {overlap}"),
+        };
+        assert_eq!((boxes, unused), (2, vec![repeated(3, "1.00"), repeated(4, "0.92")]));
     }
 }
