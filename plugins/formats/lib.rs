@@ -5,11 +5,9 @@
 //! repeated spaces and CRLF are accepted everywhere.
 // Files are untrusted input: no index is taken for granted.
 #![warn(clippy::indexing_slicing)]
-pub mod bal;
-pub mod colmap;
+mod bundle;
 pub mod detections;
 mod error;
-mod gauge;
 mod graph_format;
 pub mod inertial;
 mod lines;
@@ -21,6 +19,7 @@ pub mod timestamps;
 pub mod tum;
 pub mod whole;
 
+pub use bundle::{bal, colmap};
 pub use error::{BadLine, FormatError, Malformed, Mistake};
 
 pub use graph_format::{GraphFormat, GraphRead, GraphText, GraphWriter, InformationRepair, ReadOptions};

@@ -14,7 +14,7 @@ mod wide;
 
 pub use bal_camera::BalCamera;
 pub use camera::{Camera, CameraError};
-pub use camera_model::{AnyCamera, CameraModel};
+pub use camera_model::{AnyCamera, CameraModel, UncalibratedModel};
 pub use intrinsics::{Intrinsics, IntrinsicsOver};
 pub use inverse_depth::InverseDepthProjection;
 pub use projection::Projection;

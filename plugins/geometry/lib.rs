@@ -5,7 +5,7 @@
 //! one.
 #[doc(hidden)]
 pub mod __private {
-    pub use crate::bundle::camera_model::{CameraNames, rectify};
+    pub use crate::bundle::camera_model::{CameraNames, UncalibratedName, rectify};
     pub use manifactor_graph;
     pub use nalgebra::Vector2;
 }
@@ -23,7 +23,7 @@ pub mod testing;
 pub use bundle::{
     AnyCamera, BalCamera, Camera, CameraError, CameraModel, Distortion, DistortionError, DoubleSphere,
     ExtendedUnified, Intrinsics, IntrinsicsOver, InverseDepthProjection, KannalaBrandt, Projection,
-    ProjectionBal, Radial, RadialTangential, Stereo, UncalibratedProjection,
+    ProjectionBal, Radial, RadialTangential, Stereo, UncalibratedModel, UncalibratedProjection,
 };
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{

@@ -1,9 +1,8 @@
 //! Strategies for rotations, poses and points, including the cases that tend to break formulas.
 use crate::{
-    BalCamera, Camera, CameraModel, DoubleSphere, ExtendedUnified, ImuBias, Intrinsics, KannalaBrandt,
-    Point2, Point3, Radial, RadialTangential, Rn, Se2, Se3, Sim3, So2, So3, Twist, Velocity,
+    BalCamera, Camera, CameraModel, ImuBias, Intrinsics, KannalaBrandt, Point2, Point3, Radial,
+    RadialTangential, Rn, Se2, Se3, Sim3, So2, So3, Twist, Velocity,
 };
-use manifactor_graph::checked::{Positive, Share};
 use manifactor_testing::register_points;
 use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
 use nalgebra::{SVector, Vector1, Vector2, Vector3, Vector6};
@@ -34,8 +33,6 @@ register_points!(Intrinsics<Camera>, any_pinhole(), []);
 register_points!(Intrinsics<Radial>, any_radial(), []);
 register_points!(Intrinsics<RadialTangential>, any_radial_tangential(), []);
 register_points!(Intrinsics<KannalaBrandt>, any_kannala_brandt(), []);
-register_points!(Intrinsics<DoubleSphere>, any_double_sphere(), []);
-register_points!(Intrinsics<ExtendedUnified>, any_extended_unified(), []);
 
 /// Rotation by π about an axis that is not a coordinate axis.
 fn half_a_turn() -> So3 {
@@ -135,20 +132,6 @@ pub fn any_radial_tangential() -> impl Strategy<Value = Intrinsics<RadialTangent
 /// Intrinsics of a fisheye camera by Kannala and Brandt.
 pub fn any_kannala_brandt() -> impl Strategy<Value = Intrinsics<KannalaBrandt>> + Clone {
     (any_camera(), vector::<4>(0.02)).prop_map(|(camera, k)| Intrinsics(KannalaBrandt::new(camera, k.into())))
-}
-
-/// Intrinsics of a fisheye camera with two spheres.
-pub fn any_double_sphere() -> impl Strategy<Value = Intrinsics<DoubleSphere>> + Clone {
-    (any_camera(), -0.5..0.5f64, 0.3..0.7f64).prop_filter_map("ξ in its range", |(camera, xi, alpha)| {
-        DoubleSphere::new(camera, xi, Share::literal(alpha)).ok().map(Intrinsics)
-    })
-}
-
-/// Intrinsics of a fisheye camera with an ellipsoid.
-pub fn any_extended_unified() -> impl Strategy<Value = Intrinsics<ExtendedUnified>> + Clone {
-    (any_camera(), 0.3..0.7f64, 0.8..1.2f64).prop_map(|(camera, alpha, beta)| {
-        Intrinsics(ExtendedUnified::new(camera, Share::literal(alpha), Positive::literal(beta)))
-    })
 }
 
 /// Points in front of a camera that looks along +z, in the camera's frame: near and far, central and

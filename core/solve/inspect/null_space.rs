@@ -141,15 +141,17 @@ fn product(a: &[f64], b: &[f64], scale: &[f64]) -> f64 {
 fn free_motions(model: &Model, system: &LinearSystem, scale: &[f64]) -> Vec<(Motion, Vec<f64>)> {
     let mut free: Vec<(Motion, Vec<f64>)> = vec![];
     for motion in Motion::ALL {
-        let mut v = vec![0.0; scale.len()];
+        let (mut v, mut moving) = (vec![0.0; scale.len()], 0);
         for place in &model.variables {
             let value = place.start.and_then(|_| model.columns().column(place.column).get(place.index));
             if let (Some(start), Some(moved)) = (place.start, value.and_then(|x| x.erased().moved(motion))) {
+                moving += usize::from(moved.iter().any(|x| *x != 0.0));
                 v[start..start + moved.len()].copy_from_slice(&moved);
             }
         }
         let length = product(&v, &v, scale).sqrt();
-        if !(length > 0.0 && length.is_finite()) {
+        // a single variable is named itself
+        if moving < 2 || !(length > 0.0 && length.is_finite()) {
             continue;
         }
         v.iter_mut().for_each(|v| *v /= length);

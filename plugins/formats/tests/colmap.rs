@@ -1,7 +1,7 @@
 //! Models of COLMAP: reading, writing, and solving.
 use manifactor_formats::colmap::{Camera, Image, ImagePoint, Lens, Model, Point};
 use manifactor_formats::{FormatError, GraphFormat, GraphRead};
-use manifactor_geometry::{CameraModel, Coordinates, Intrinsics, Radial, Se3, So3};
+use manifactor_geometry::{CameraModel, Coordinates, Intrinsics, Radial, Se3, So3, UncalibratedModel};
 use manifactor_graph::{Fixed, Key};
 use manifactor_solve::{Auto, GaussNewton, Optimizer, Silent, solve};
 use nalgebra::{Vector2, Vector3, Vector5};

@@ -1,5 +1,5 @@
 //! Pinhole cameras without distortion.
-use crate::{CameraModel, Se3, register_camera};
+use crate::{CameraModel, Se3, UncalibratedModel, register_camera};
 use manifactor_graph::Scalar;
 use nalgebra::{Matrix2x3, Matrix2x4, Matrix3, Matrix3x4, U4, Vector2, Vector3, Vector4};
 use schemars::JsonSchema;
@@ -124,6 +124,33 @@ impl CameraModel for Camera {
     const EXAMPLE: &'static str =
         "{ fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
 
+    #[inline(always)]
+    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+        self.project_with(&self.lifted(), point)
+    }
+
+    fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
+        Some(self.ray(*pixel))
+    }
+
+    #[inline(always)]
+    fn sees(&self, point: &Vector3<f64>) -> bool {
+        point.z > 0.0 && point.z * point.z > MIN_RELATIVE_DEPTH * MIN_RELATIVE_DEPTH * point.norm_squared()
+    }
+
+    fn pinhole(&self) -> Camera {
+        *self
+    }
+
+    #[inline(always)]
+    fn derivative(&self, point: &Vector3<f64>) -> Matrix2x3<f64> {
+        let Self { fx, fy, skew, .. } = *self;
+        let (x, y, w) = (point.x / point.z, point.y / point.z, point.z.recip());
+        Matrix2x3::new(fx, skew, -(fx * x + skew * y), 0.0, fy, -fy * y) * w
+    }
+}
+
+impl UncalibratedModel for Camera {
     type Dim = U4;
     const INTRINSICS: &'static [&'static str] = &["fx", "fy", "cx", "cy"];
 
@@ -147,26 +174,6 @@ impl CameraModel for Camera {
         let (x, y) = (point.x / point.z, point.y / point.z);
         let [fx, fy, cx, cy] = (*intrinsics).into();
         Vector2::new(x * fx + y * self.skew + cx, y * fy + cy)
-    }
-
-    fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
-        Some(self.ray(*pixel))
-    }
-
-    #[inline(always)]
-    fn sees(&self, point: &Vector3<f64>) -> bool {
-        point.z > 0.0 && point.z * point.z > MIN_RELATIVE_DEPTH * MIN_RELATIVE_DEPTH * point.norm_squared()
-    }
-
-    fn pinhole(&self) -> Camera {
-        *self
-    }
-
-    #[inline(always)]
-    fn derivative(&self, point: &Vector3<f64>) -> Matrix2x3<f64> {
-        let Self { fx, fy, skew, .. } = *self;
-        let (x, y, w) = (point.x / point.z, point.y / point.z, point.z.recip());
-        Matrix2x3::new(fx, skew, -(fx * x + skew * y), 0.0, fy, -fy * y) * w
     }
 
     #[inline(always)]

@@ -17,31 +17,8 @@ pub trait CameraModel:
     /// A camera in the inline TOML form used inside a factor; an example for the catalogue.
     const EXAMPLE: &'static str;
 
-    /// Number of intrinsics that can be estimated.
-    type Dim: Dimension;
-
-    /// Names of these intrinsics, in the order of [`intrinsics`](Self::intrinsics).
-    const INTRINSICS: &'static [&'static str];
-
-    /// Returns the intrinsics that can be estimated: focal lengths, principal point, then the lens.
-    fn intrinsics(&self) -> Vector<Self::Dim>;
-
-    /// Returns the same camera with other intrinsics. A camera with [invalid](Self::is_valid) ones sees nothing.
-    #[must_use]
-    fn with_intrinsics(&self, intrinsics: &Vector<Self::Dim>) -> Self;
-
-    /// Returns whether the intrinsics are those of a camera: for example, focal lengths above zero.
-    fn is_valid(&self) -> bool;
-
-    /// Returns the pixel of a point that the camera [sees](Self::sees), with other intrinsics.
-    fn project_with<T: Scalar>(&self, intrinsics: &Vector<Self::Dim, T>, point: &Vector3<T>) -> Vector2<T>;
-
     /// Returns the pixel of a point that the camera [sees](Self::sees).
-    #[inline(always)]
-    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
-        let intrinsics = self.intrinsics();
-        self.project_with(&Self::Dim::vector(|i| T::from(intrinsics.as_ref()[i])), point)
-    }
+    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T>;
 
     /// Returns a direction that projects to the pixel, of any length, or `None` if the model has none.
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>>;
@@ -65,8 +42,37 @@ pub trait CameraModel:
         }
         derivative
     }
+}
 
-    /// Returns the derivative of [`project`](Self::project) with respect to the intrinsics. The default uses dual
+/// A [`CameraModel`] whose intrinsics can be a variable, [`Intrinsics`](crate::Intrinsics).
+pub trait UncalibratedModel: CameraModel {
+    /// Number of intrinsics that can be estimated.
+    type Dim: Dimension;
+
+    /// Names of these intrinsics, in the order of [`intrinsics`](Self::intrinsics).
+    const INTRINSICS: &'static [&'static str];
+
+    /// Returns the intrinsics that can be estimated: focal lengths, principal point, then the lens.
+    fn intrinsics(&self) -> Vector<Self::Dim>;
+
+    /// Returns the same camera with other intrinsics. A camera with [invalid](Self::is_valid) ones sees nothing.
+    #[must_use]
+    fn with_intrinsics(&self, intrinsics: &Vector<Self::Dim>) -> Self;
+
+    /// Returns whether the intrinsics are those of a camera: for example, focal lengths above zero.
+    fn is_valid(&self) -> bool;
+
+    /// Returns the pixel of a point that the camera sees, with other intrinsics.
+    fn project_with<T: Scalar>(&self, intrinsics: &Vector<Self::Dim, T>, point: &Vector3<T>) -> Vector2<T>;
+
+    /// Returns the intrinsics as constants.
+    #[inline(always)]
+    fn lifted<T: Scalar>(&self) -> Vector<Self::Dim, T> {
+        let intrinsics = self.intrinsics();
+        Self::Dim::vector(|i| T::from(intrinsics.as_ref()[i]))
+    }
+
+    /// Returns the derivative of `project` with respect to the intrinsics. The default uses dual
     /// numbers; a model can override it.
     #[inline]
     fn derivative_by_intrinsics(&self, point: &Vector3<f64>) -> Matrix<U2, Self::Dim> {
@@ -103,6 +109,11 @@ pub trait CameraNames {
     const MODEL: &'static str;
     /// Name of its [`Projection`](crate::Projection) factor.
     const PROJECTION: &'static str;
+}
+
+/// Name of an [`UncalibratedModel`] in documents. Implemented by [`register_camera!`](crate::register_camera).
+#[doc(hidden)]
+pub trait UncalibratedName {
     /// Name of its [`UncalibratedProjection`](crate::UncalibratedProjection) factor.
     const UNCALIBRATED: &'static str;
 }
@@ -154,16 +165,28 @@ macro_rules! camera_document {
 }
 pub(crate) use camera_document;
 
-/// Registers a [`CameraModel`](crate::CameraModel): as a camera for sources, as a variable, and its point projection
-/// as two factors, of a calibrated and of an uncalibrated camera:
-/// `register_camera!("radial", "projection_radial", "uncalibrated_radial", Radial);`
+/// Registers a [`CameraModel`](crate::CameraModel) as a camera for sources, and its point projection as a
+/// factor: `register_camera!("double_sphere", "projection_double_sphere", DoubleSphere);`
+///
+/// An [`UncalibratedModel`](crate::UncalibratedModel) has a further name, of the projection with unknown intrinsics, and
+/// is a type of variables, too: `register_camera!("radial", "projection_radial", "uncalibrated_radial", Radial);`
 #[macro_export]
 macro_rules! register_camera {
     ($name:literal, $projection:literal, $uncalibrated:literal, $type:ty) => {
+        $crate::register_camera!($name, $projection, $type);
+        impl $crate::__private::UncalibratedName for $type {
+            const UNCALIBRATED: &'static str = $uncalibrated;
+        }
+        $crate::__private::manifactor_graph::register_manifold!($name, $crate::Intrinsics<$type>);
+        $crate::__private::manifactor_graph::register_factor!(
+            $uncalibrated,
+            $crate::UncalibratedProjection<$type>
+        );
+    };
+    ($name:literal, $projection:literal, $type:ty) => {
         impl $crate::__private::CameraNames for $type {
             const MODEL: &'static str = $name;
             const PROJECTION: &'static str = $projection;
-            const UNCALIBRATED: &'static str = $uncalibrated;
         }
         const _: () = {
             use $crate::__private::manifactor_graph::__private::typetag;
@@ -181,11 +204,6 @@ macro_rules! register_camera {
             }
             $crate::__private::manifactor_graph::register!(dyn $crate::AnyCamera, $name, $type);
         };
-        $crate::__private::manifactor_graph::register_manifold!($name, $crate::Intrinsics<$type>);
         $crate::__private::manifactor_graph::register_factor!($projection, $crate::Projection<$type>);
-        $crate::__private::manifactor_graph::register_factor!(
-            $uncalibrated,
-            $crate::UncalibratedProjection<$type>
-        );
     };
 }

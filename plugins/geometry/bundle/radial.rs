@@ -1,6 +1,8 @@
 //! Camera with one focal length and radial distortion.
 use crate::bundle::radial_tangential::smallest_root;
-use crate::{Camera, CameraError, CameraModel, Coordinates, RadialTangential, register_camera};
+use crate::{
+    Camera, CameraError, CameraModel, Coordinates, RadialTangential, UncalibratedModel, register_camera,
+};
 use manifactor_graph::Scalar;
 use nalgebra::{Matrix2x3, Matrix2x5, U5, Vector2, Vector3, Vector5};
 use schemars::JsonSchema;
@@ -71,32 +73,10 @@ impl Radial {
 impl CameraModel for Radial {
     const EXAMPLE: &'static str =
         "{ f = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480, distortion = [0.1, 0.02] }";
-    type Dim = U5;
-    const INTRINSICS: &'static [&'static str] = &["f", "cx", "cy", "k1", "k2"];
 
     #[inline(always)]
-    fn intrinsics(&self) -> Vector5<f64> {
-        let (Camera { fx, cx, cy, .. }, [k1, k2]) = (self.pinhole, self.distortion);
-        Vector5::new(fx, cx, cy, k1, k2)
-    }
-
-    fn with_intrinsics(&self, intrinsics: &Vector5<f64>) -> Self {
-        let [f, cx, cy, k1, k2] = (*intrinsics).into();
-        Self::unchecked(Camera { fx: f, fy: f, cx, cy, ..self.pinhole }, [k1, k2])
-    }
-
-    #[inline(always)]
-    fn is_valid(&self) -> bool {
-        self.pinhole.is_valid()
-    }
-
-    #[inline(always)]
-    fn project_with<T: Scalar>(&self, intrinsics: &Vector5<T>, point: &Vector3<T>) -> Vector2<T> {
-        let [f, cx, cy, k1, k2] = (*intrinsics).into();
-        let p = point.xy() / point.z;
-        let rho = p.norm_squared();
-        let scale = f * (T::from(1.0) + rho * (k1 + rho * k2));
-        Vector2::new(p.x * scale + cx, p.y * scale + cy)
+    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+        self.project_with(&self.lifted(), point)
     }
 
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
@@ -124,6 +104,36 @@ impl CameraModel for Radial {
         let (xx, yy) = (scale * (radial + slope * p.x * p.x), scale * (radial + slope * p.y * p.y));
         let xy = scale * slope * p.x * p.y;
         Matrix2x3::new(xx, xy, -(xx * p.x + xy * p.y), xy, yy, -(xy * p.x + yy * p.y))
+    }
+}
+
+impl UncalibratedModel for Radial {
+    type Dim = U5;
+    const INTRINSICS: &'static [&'static str] = &["f", "cx", "cy", "k1", "k2"];
+
+    #[inline(always)]
+    fn intrinsics(&self) -> Vector5<f64> {
+        let (Camera { fx, cx, cy, .. }, [k1, k2]) = (self.pinhole, self.distortion);
+        Vector5::new(fx, cx, cy, k1, k2)
+    }
+
+    fn with_intrinsics(&self, intrinsics: &Vector5<f64>) -> Self {
+        let [f, cx, cy, k1, k2] = (*intrinsics).into();
+        Self::unchecked(Camera { fx: f, fy: f, cx, cy, ..self.pinhole }, [k1, k2])
+    }
+
+    #[inline(always)]
+    fn is_valid(&self) -> bool {
+        self.pinhole.is_valid()
+    }
+
+    #[inline(always)]
+    fn project_with<T: Scalar>(&self, intrinsics: &Vector5<T>, point: &Vector3<T>) -> Vector2<T> {
+        let [f, cx, cy, k1, k2] = (*intrinsics).into();
+        let p = point.xy() / point.z;
+        let rho = p.norm_squared();
+        let scale = f * (T::from(1.0) + rho * (k1 + rho * k2));
+        Vector2::new(p.x * scale + cx, p.y * scale + cy)
     }
 
     #[inline]

@@ -1,6 +1,6 @@
 //! Camera with radial and tangential lens distortion.
 use crate::bundle::camera_model::camera_document;
-use crate::{Camera, CameraError, CameraModel, Point2, register_camera};
+use crate::{Camera, CameraError, CameraModel, Point2, UncalibratedModel, register_camera};
 use manifactor_graph::{Jet, JetOf, Manifold, Scalar};
 use nalgebra::{Matrix2, SVector, U2, U8, Vector2, Vector3, Vector4};
 use schemars::JsonSchema;
@@ -183,33 +183,9 @@ impl CameraModel for RadialTangential {
     const EXAMPLE: &'static str = "{ fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480, \
                                    distortion = [0.1, 0.02, 0.0, 0.0, 0.0] }";
 
-    type Dim = U8;
-    const INTRINSICS: &'static [&'static str] = &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"];
-
     #[inline(always)]
-    fn intrinsics(&self) -> SVector<f64, 8> {
-        let Camera { fx, fy, cx, cy, .. } = self.pinhole;
-        let [k1, k2, p1, p2, ..] = self.distortion.coefficients;
-        SVector::from([fx, fy, cx, cy, k1, k2, p1, p2])
-    }
-
-    fn with_intrinsics(&self, intrinsics: &SVector<f64, 8>) -> Self {
-        let [fx, fy, cx, cy, lens @ ..]: [f64; 8] = (*intrinsics).into();
-        let mut distortion = self.distortion;
-        distortion.coefficients.iter_mut().zip(lens).for_each(|(k, new)| *k = new);
-        Self::new(Camera { fx, fy, cx, cy, ..self.pinhole }, distortion)
-    }
-
-    #[inline(always)]
-    fn is_valid(&self) -> bool {
-        self.pinhole.is_valid()
-    }
-
-    #[inline(always)]
-    fn project_with<T: Scalar>(&self, intrinsics: &SVector<T, 8>, point: &Vector3<T>) -> Vector2<T> {
-        let [fx, fy, cx, cy, k1, k2, p1, p2] = (*intrinsics).into();
-        let [x, y] = self.distort_with([k1, k2, p1, p2], [point.x / point.z, point.y / point.z]);
-        self.pinhole.project_with(&Vector4::new(fx, fy, cx, cy), &Vector3::new(x, y, T::from(1.0)))
+    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+        self.project_with(&self.lifted(), point)
     }
 
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
@@ -255,6 +231,37 @@ impl CameraModel for RadialTangential {
 
     fn pinhole(&self) -> Camera {
         self.pinhole
+    }
+}
+
+impl UncalibratedModel for RadialTangential {
+    type Dim = U8;
+    const INTRINSICS: &'static [&'static str] = &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"];
+
+    #[inline(always)]
+    fn intrinsics(&self) -> SVector<f64, 8> {
+        let Camera { fx, fy, cx, cy, .. } = self.pinhole;
+        let [k1, k2, p1, p2, ..] = self.distortion.coefficients;
+        SVector::from([fx, fy, cx, cy, k1, k2, p1, p2])
+    }
+
+    fn with_intrinsics(&self, intrinsics: &SVector<f64, 8>) -> Self {
+        let [fx, fy, cx, cy, lens @ ..]: [f64; 8] = (*intrinsics).into();
+        let mut distortion = self.distortion;
+        distortion.coefficients.iter_mut().zip(lens).for_each(|(k, new)| *k = new);
+        Self::new(Camera { fx, fy, cx, cy, ..self.pinhole }, distortion)
+    }
+
+    #[inline(always)]
+    fn is_valid(&self) -> bool {
+        self.pinhole.is_valid()
+    }
+
+    #[inline(always)]
+    fn project_with<T: Scalar>(&self, intrinsics: &SVector<T, 8>, point: &Vector3<T>) -> Vector2<T> {
+        let [fx, fy, cx, cy, k1, k2, p1, p2] = (*intrinsics).into();
+        let [x, y] = self.distort_with([k1, k2, p1, p2], [point.x / point.z, point.y / point.z]);
+        self.pinhole.project_with(&Vector4::new(fx, fy, cx, cy), &Vector3::new(x, y, T::from(1.0)))
     }
 }
 

@@ -3,7 +3,7 @@ use crate::bundle::camera_model::camera_document;
 use crate::{Camera, CameraError, CameraModel, register_camera};
 use manifactor_graph::Scalar;
 use manifactor_graph::checked::Share;
-use nalgebra::{U6, Vector2, Vector3, Vector4, Vector6};
+use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// A fisheye camera with two parameters.
@@ -31,8 +31,7 @@ camera_document! {
     /// Distance ξ of the spheres' centres, above -1 and up to 1.
     xi: f64,
     /// Place α of the pinhole, from 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    alpha: f64
+    alpha: Share
 }
 
 impl DoubleSphere {
@@ -53,32 +52,13 @@ impl CameraModel for DoubleSphere {
     const EXAMPLE: &'static str = "{ fx = 364.0, fy = 364.0, cx = 512.0, cy = 512.0, width = 1024, height = 1024, \
                                    xi = -0.25, alpha = 0.5 }";
 
-    type Dim = U6;
-    const INTRINSICS: &'static [&'static str] = &["fx", "fy", "cx", "cy", "xi", "alpha"];
-
     #[inline(always)]
-    fn intrinsics(&self) -> Vector6<f64> {
-        let Camera { fx, fy, cx, cy, .. } = self.pinhole;
-        Vector6::new(fx, fy, cx, cy, self.xi, self.alpha)
-    }
-
-    fn with_intrinsics(&self, intrinsics: &Vector6<f64>) -> Self {
-        let [fx, fy, cx, cy, xi, alpha] = (*intrinsics).into();
-        Self { pinhole: Camera { fx, fy, cx, cy, ..self.pinhole }, xi, alpha }
-    }
-
-    #[inline(always)]
-    fn is_valid(&self) -> bool {
-        self.pinhole.is_valid() && self.xi > -1.0 && self.xi <= 1.0 && (0.0..=1.0).contains(&self.alpha)
-    }
-
-    #[inline(always)]
-    fn project_with<T: Scalar>(&self, intrinsics: &Vector6<T>, point: &Vector3<T>) -> Vector2<T> {
-        let [fx, fy, cx, cy, xi, alpha] = (*intrinsics).into();
+    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+        let [xi, alpha] = [self.xi, self.alpha].map(T::from);
         let side = point.x * point.x + point.y * point.y;
         let ahead = xi * (side + point.z * point.z).sqrt() + point.z;
         let depth = alpha * (side + ahead * ahead).sqrt() + (T::from(1.0) - alpha) * ahead;
-        self.pinhole.project_with(&Vector4::new(fx, fy, cx, cy), &Vector3::new(point.x, point.y, depth))
+        self.pinhole.project(&Vector3::new(point.x, point.y, depth))
     }
 
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
@@ -111,24 +91,18 @@ impl CameraModel for DoubleSphere {
     }
 }
 
-register_camera!("double_sphere", "projection_double_sphere", "uncalibrated_double_sphere", DoubleSphere);
-
-/// Checks the parameter α of a document.
-pub(super) fn share(alpha: f64) -> Result<Share, CameraError> {
-    let fault = CameraError { field: "alpha", expected: "a number from 0 to 1", found: alpha };
-    Share::new(alpha).map_err(|_| fault)
-}
+register_camera!("double_sphere", "projection_double_sphere", DoubleSphere);
 
 impl TryFrom<Document> for DoubleSphere {
     type Error = CameraError;
     fn try_from(document: Document) -> Result<Self, CameraError> {
-        Self::new(document.pinhole()?, document.xi, share(document.alpha)?)
+        Self::new(document.pinhole()?, document.xi, document.alpha)
     }
 }
 
 impl From<DoubleSphere> for Document {
     fn from(camera: DoubleSphere) -> Self {
-        Self::of(camera.pinhole, camera.xi, camera.alpha)
+        Self::of(camera.pinhole, camera.xi, Share::literal(camera.alpha))
     }
 }
 

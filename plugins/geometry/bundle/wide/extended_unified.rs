@@ -1,10 +1,9 @@
 //! Fisheye camera with an ellipsoid.
 use crate::bundle::camera_model::camera_document;
-use crate::bundle::wide::double_sphere::share;
 use crate::{Camera, CameraError, CameraModel, register_camera};
 use manifactor_graph::Scalar;
 use manifactor_graph::checked::{Positive, Share};
-use nalgebra::{U6, Vector2, Vector3, Vector4, Vector6};
+use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// A fisheye camera with two parameters.
@@ -31,25 +30,15 @@ pub struct ExtendedUnified {
 camera_document! {
     "ExtendedUnified",
     /// Share α of the distance in the depth, from 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    alpha: f64,
-    /// Weight β of the distance from the optical axis, above zero.
-    beta: f64
+    alpha: Share,
+    /// Weight β of the distance from the optical axis.
+    beta: Positive
 }
 
 impl ExtendedUnified {
     /// Creates a camera with the focal lengths, principal point and size of `pinhole`.
     pub fn new(pinhole: Camera, alpha: Share, beta: Positive) -> Self {
         Self { pinhole, alpha: alpha.get(), beta: beta.get() }
-    }
-
-    /// Works like [`new`](Self::new), for numbers that are not checked yet.
-    ///
-    /// # Errors
-    /// If α is not a number from 0 to 1, or β not a finite number above zero.
-    pub fn of_numbers(pinhole: Camera, alpha: f64, beta: f64) -> Result<Self, CameraError> {
-        let fault = CameraError { field: "beta", expected: "a finite number above zero", found: beta };
-        Ok(Self::new(pinhole, share(alpha)?, Positive::new(beta).map_err(|_| fault)?))
     }
 
     fn distance(&self, point: &Vector3<f64>) -> f64 {
@@ -61,31 +50,12 @@ impl CameraModel for ExtendedUnified {
     const EXAMPLE: &'static str = "{ fx = 366.0, fy = 366.0, cx = 512.0, cy = 512.0, width = 1024, height = 1024, \
                                    alpha = 0.5, beta = 1.0 }";
 
-    type Dim = U6;
-    const INTRINSICS: &'static [&'static str] = &["fx", "fy", "cx", "cy", "alpha", "beta"];
-
     #[inline(always)]
-    fn intrinsics(&self) -> Vector6<f64> {
-        let Camera { fx, fy, cx, cy, .. } = self.pinhole;
-        Vector6::new(fx, fy, cx, cy, self.alpha, self.beta)
-    }
-
-    fn with_intrinsics(&self, intrinsics: &Vector6<f64>) -> Self {
-        let [fx, fy, cx, cy, alpha, beta] = (*intrinsics).into();
-        Self { pinhole: Camera { fx, fy, cx, cy, ..self.pinhole }, alpha, beta }
-    }
-
-    #[inline(always)]
-    fn is_valid(&self) -> bool {
-        self.pinhole.is_valid() && (0.0..=1.0).contains(&self.alpha) && self.beta > 0.0
-    }
-
-    #[inline(always)]
-    fn project_with<T: Scalar>(&self, intrinsics: &Vector6<T>, point: &Vector3<T>) -> Vector2<T> {
-        let [fx, fy, cx, cy, alpha, beta] = (*intrinsics).into();
+    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+        let [alpha, beta] = [self.alpha, self.beta].map(T::from);
         let distance = (beta * (point.x * point.x + point.y * point.y) + point.z * point.z).sqrt();
         let depth = alpha * distance + (T::from(1.0) - alpha) * point.z;
-        self.pinhole.project_with(&Vector4::new(fx, fy, cx, cy), &Vector3::new(point.x, point.y, depth))
+        self.pinhole.project(&Vector3::new(point.x, point.y, depth))
     }
 
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
@@ -114,26 +84,18 @@ impl CameraModel for ExtendedUnified {
     }
 }
 
-register_camera!(
-    "extended_unified",
-    "projection_extended_unified",
-    "uncalibrated_extended_unified",
-    ExtendedUnified
-);
+register_camera!("extended_unified", "projection_extended_unified", ExtendedUnified);
 
 impl TryFrom<Document> for ExtendedUnified {
     type Error = CameraError;
     fn try_from(document: Document) -> Result<Self, CameraError> {
-        let fault =
-            CameraError { field: "beta", expected: "a finite number above zero", found: document.beta };
-        let beta = Positive::new(document.beta).map_err(|_| fault)?;
-        Ok(Self::new(document.pinhole()?, share(document.alpha)?, beta))
+        Ok(Self::new(document.pinhole()?, document.alpha, document.beta))
     }
 }
 
 impl From<ExtendedUnified> for Document {
     fn from(camera: ExtendedUnified) -> Self {
-        Self::of(camera.pinhole, camera.alpha, camera.beta)
+        Self::of(camera.pinhole, Share::literal(camera.alpha), Positive::literal(camera.beta))
     }
 }
 

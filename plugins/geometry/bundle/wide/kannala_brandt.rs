@@ -1,6 +1,6 @@
 //! Fisheye camera by Kannala and Brandt.
 use crate::bundle::camera_model::camera_document;
-use crate::{Camera, CameraModel, Coordinates, register_camera};
+use crate::{Camera, CameraModel, Coordinates, UncalibratedModel, register_camera};
 use manifactor_graph::Scalar;
 use nalgebra::{SVector, U8, Vector2, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
@@ -82,6 +82,38 @@ impl CameraModel for KannalaBrandt {
     const EXAMPLE: &'static str = "{ fx = 285.0, fy = 285.0, cx = 424.0, cy = 400.0, width = 848, height = 800, \
                                    distortion = [0.01, 0.02, 0.0, 0.0] }";
 
+    #[inline(always)]
+    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+        self.project_with(&self.lifted(), point)
+    }
+
+    fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
+        let seen = self.pinhole.ray(*pixel).xy();
+        let radius = seen.norm();
+        if radius == 0.0 {
+            return Some(Vector3::z());
+        }
+        if self.radius(self.max_angle) <= radius {
+            return None;
+        }
+        let theta = bisected([0.0, self.max_angle], |theta| self.radius(theta) >= radius);
+        let side = seen * (theta.sin() / radius);
+        Some(Vector3::new(side.x, side.y, theta.cos()))
+    }
+
+    #[inline(always)]
+    fn sees(&self, point: &Vector3<f64>) -> bool {
+        let side = point.xy().norm();
+        let is_ray = side > 0.0 || point.z > 0.0;
+        is_ray && side.atan2(point.z) < self.max_angle
+    }
+
+    fn pinhole(&self) -> Camera {
+        self.pinhole
+    }
+}
+
+impl UncalibratedModel for KannalaBrandt {
     type Dim = U8;
     const INTRINSICS: &'static [&'static str] = &["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"];
 
@@ -114,31 +146,6 @@ impl CameraModel for KannalaBrandt {
         };
         let seen = Vector3::new(point.x * scale, point.y * scale, T::from(1.0));
         self.pinhole.project_with(&Vector4::new(fx, fy, cx, cy), &seen)
-    }
-
-    fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
-        let seen = self.pinhole.ray(*pixel).xy();
-        let radius = seen.norm();
-        if radius == 0.0 {
-            return Some(Vector3::z());
-        }
-        if self.radius(self.max_angle) <= radius {
-            return None;
-        }
-        let theta = bisected([0.0, self.max_angle], |theta| self.radius(theta) >= radius);
-        let side = seen * (theta.sin() / radius);
-        Some(Vector3::new(side.x, side.y, theta.cos()))
-    }
-
-    #[inline(always)]
-    fn sees(&self, point: &Vector3<f64>) -> bool {
-        let side = point.xy().norm();
-        let is_ray = side > 0.0 || point.z > 0.0;
-        is_ray && side.atan2(point.z) < self.max_angle
-    }
-
-    fn pinhole(&self) -> Camera {
-        self.pinhole
     }
 }
 

@@ -15,8 +15,8 @@
 //! free. By default, the reader [holds](read) the pose of one camera and, for the scale, one direction of the
 //! camera that is farthest from it. This does not change the cost. Gauss-Newton requires it. Damped solvers
 //! do not, but report an undetermined direction at the end.
+use crate::bundle::gauge::{fix_gauge, gauge_note};
 use crate::error::{FormatError, Mistake, ProblemList};
-use crate::gauge::{fix_gauge, gauge_note};
 use crate::graph_format::{GraphFormat, GraphRead, GraphText};
 use crate::lines::{Fields, lines, number};
 use crate::text::read_text;

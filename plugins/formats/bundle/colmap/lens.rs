@@ -1,7 +1,7 @@
 //! Camera models by COLMAP's names.
 use manifactor_geometry::{
-    AnyCamera, Camera, CameraError, CameraModel, Distortion, DistortionError, ExtendedUnified, KannalaBrandt,
-    Radial, RadialTangential,
+    AnyCamera, Camera, CameraError, CameraModel, Distortion, DistortionError, KannalaBrandt, Radial,
+    RadialTangential, UncalibratedModel,
 };
 use std::sync::Arc;
 
@@ -22,13 +22,11 @@ pub enum Model {
     FullOpenCv,
     /// fx, fy, cx, cy, k₁, k₂, k₃, k₄.
     OpenCvFisheye,
-    /// fx, fy, cx, cy, α, β.
-    Eucm,
 }
 
 /// Name, number of parameters, and the intrinsics that are held: principal points, as in COLMAP's own bundle adjustment,
 /// and what the model does not have.
-const MODELS: [(Model, &str, usize, &[&str]); 8] = [
+const MODELS: [(Model, &str, usize, &[&str]); 7] = [
     (Model::SimplePinhole, "SIMPLE_PINHOLE", 3, &["cx", "cy", "k1", "k2"]),
     (Model::Pinhole, "PINHOLE", 4, &["cx", "cy"]),
     (Model::SimpleRadial, "SIMPLE_RADIAL", 4, &["cx", "cy", "k2"]),
@@ -36,7 +34,6 @@ const MODELS: [(Model, &str, usize, &[&str]); 8] = [
     (Model::OpenCv, "OPENCV", 8, &["cx", "cy"]),
     (Model::FullOpenCv, "FULL_OPENCV", 12, &["cx", "cy"]),
     (Model::OpenCvFisheye, "OPENCV_FISHEYE", 8, &["cx", "cy"]),
-    (Model::Eucm, "EUCM", 6, &["cx", "cy"]),
 ];
 
 impl Model {
@@ -67,19 +64,16 @@ pub enum Lens {
     RadialTangential(RadialTangential),
     /// A fisheye camera by Kannala and Brandt.
     KannalaBrandt(KannalaBrandt),
-    /// A fisheye camera with an ellipsoid.
-    ExtendedUnified(ExtendedUnified),
 }
 
 /// Evaluates an expression with the camera of a [`Lens`], whatever its type.
 macro_rules! each_lens {
     ($lens:expr, $camera:ident => $value:expr) => {
         match $lens {
-            $crate::colmap::lens::Lens::Pinhole($camera) => $value,
-            $crate::colmap::lens::Lens::Radial($camera) => $value,
-            $crate::colmap::lens::Lens::RadialTangential($camera) => $value,
-            $crate::colmap::lens::Lens::KannalaBrandt($camera) => $value,
-            $crate::colmap::lens::Lens::ExtendedUnified($camera) => $value,
+            $crate::bundle::colmap::lens::Lens::Pinhole($camera) => $value,
+            $crate::bundle::colmap::lens::Lens::Radial($camera) => $value,
+            $crate::bundle::colmap::lens::Lens::RadialTangential($camera) => $value,
+            $crate::bundle::colmap::lens::Lens::KannalaBrandt($camera) => $value,
         }
     };
 }
@@ -136,9 +130,6 @@ impl Lens {
                     (Model::OpenCvFisheye, &[k1, k2, k3, k4]) => {
                         Self::KannalaBrandt(KannalaBrandt::new(pinhole, [k1, k2, k3, k4]))
                     }
-                    (Model::Eucm, &[alpha, beta]) => {
-                        Self::ExtendedUnified(ExtendedUnified::of_numbers(pinhole, alpha, beta)?)
-                    }
                     (_, []) => Self::Pinhole(pinhole),
                     _ => {
                         let distortion = Distortion::try_from(lens.to_vec())?;
@@ -159,7 +150,6 @@ impl Lens {
             Self::RadialTangential(camera) if camera.distortion().further() == [0.0; 4] => Model::OpenCv,
             Self::RadialTangential(_) => Model::FullOpenCv,
             Self::KannalaBrandt(_) => Model::OpenCvFisheye,
-            Self::ExtendedUnified(_) => Model::Eucm,
         }
     }
 
@@ -181,7 +171,7 @@ impl Lens {
 
     /// Returns the camera for a source: a pinhole camera if nothing is distorted.
     pub fn camera(self) -> Arc<dyn AnyCamera> {
-        let is_fisheye = matches!(self, Self::KannalaBrandt(_) | Self::ExtendedUnified(_));
+        let is_fisheye = matches!(self, Self::KannalaBrandt(_));
         let parameters = self.parameters(Model::FullOpenCv);
         let first = if matches!(self, Self::Radial(_)) { 3 } else { 4 };
         let is_plain = !is_fisheye && parameters.iter().skip(first).all(|k| *k == 0.0);

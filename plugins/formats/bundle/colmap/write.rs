@@ -4,8 +4,8 @@ use super::lens::each_lens;
 use super::{Camera, Image, ImagePoint, Lens, Model, Point};
 use crate::text::words::{ByName, count, omission_notes};
 use manifactor_geometry::{
-    CameraModel, Coordinates, ExtendedUnified, Intrinsics, KannalaBrandt, Point3, Radial, RadialTangential,
-    Se3, UncalibratedProjection,
+    CameraModel, Coordinates, Intrinsics, KannalaBrandt, Point3, Radial, RadialTangential, Se3,
+    UncalibratedModel, UncalibratedProjection,
 };
 use manifactor_graph::{FactorEntry, Graph, Key, Values, Variable};
 use std::collections::HashMap;
@@ -144,12 +144,11 @@ fn lens_of(variable: &dyn Variable) -> Option<Lens> {
         .or_else(|| any.downcast_ref().map(|Intrinsics(camera)| Lens::Radial(*camera)))
         .or_else(|| any.downcast_ref().map(|Intrinsics(camera)| Lens::RadialTangential(*camera)))
         .or_else(|| any.downcast_ref().map(|Intrinsics(camera)| Lens::KannalaBrandt(*camera)))
-        .or_else(|| any.downcast_ref().map(|Intrinsics(camera)| Lens::ExtendedUnified(*camera)))
 }
 
 /// Returns the keys of pose, point and camera of an observation, and its pixel; `None` for other factors.
 fn observation(entry: &FactorEntry) -> Option<([&Key; 3], Coordinates<2>)> {
-    fn pixel<M: CameraModel>(entry: &FactorEntry) -> Option<Coordinates<2>> {
+    fn pixel<M: UncalibratedModel>(entry: &FactorEntry) -> Option<Coordinates<2>> {
         let factor: &UncalibratedProjection<M> = entry.factor.erased().as_any().downcast_ref()?;
         factor.body_from_camera.is_none().then_some(factor.pixel)
     }
@@ -157,7 +156,6 @@ fn observation(entry: &FactorEntry) -> Option<([&Key; 3], Coordinates<2>)> {
     let pixel = pixel::<manifactor_geometry::Camera>(entry)
         .or_else(|| pixel::<Radial>(entry))
         .or_else(|| pixel::<RadialTangential>(entry))
-        .or_else(|| pixel::<KannalaBrandt>(entry))
-        .or_else(|| pixel::<ExtendedUnified>(entry))?;
+        .or_else(|| pixel::<KannalaBrandt>(entry))?;
     Some(([pose, point, camera], pixel))
 }

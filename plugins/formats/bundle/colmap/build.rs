@@ -1,10 +1,10 @@
 //! The graph of a model.
 use super::lens::each_lens;
 use super::{Image, ImagePoint, Model};
-use crate::gauge::{fix_gauge, gauge_note};
+use crate::bundle::gauge::{fix_gauge, gauge_note};
 use crate::graph_format::GraphRead;
 use crate::text::words::{count, list};
-use manifactor_geometry::{CameraModel, Coordinates, Intrinsics, Point3, UncalibratedProjection};
+use manifactor_geometry::{Coordinates, Intrinsics, Point3, UncalibratedModel, UncalibratedProjection};
 use manifactor_graph::{Factor, Graph, Key, Values};
 use std::collections::HashMap;
 
@@ -85,7 +85,7 @@ impl Model {
 type AddProjection = fn(&mut Graph, [Key; 3], Coordinates<2>);
 
 /// Returns the function for cameras of this type.
-fn add_projection<M: CameraModel>(_: &M) -> AddProjection
+fn add_projection<M: UncalibratedModel>(_: &M) -> AddProjection
 where
     UncalibratedProjection<M>: Factor,
 {
