@@ -101,8 +101,8 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
     if curvature(model, system, &v) >= MAX_CURVATURE {
         return None;
     }
-    let motions = free_motions(model, system, &scale);
-    let mut found = Undetermined { free: words(&motions), ..Undetermined::default() };
+    let (motions, possible) = free_motions(model, system, &scale);
+    let mut found = Undetermined { free: words(&motions, &possible), ..Undetermined::default() };
     for (_, motion) in &motions {
         let along: f64 = product(&v, motion, &scale);
         v.iter_mut().zip(motion).for_each(|(v, m)| *v -= along * m);
@@ -137,9 +137,13 @@ fn product(a: &[f64], b: &[f64], scale: &[f64]) -> f64 {
 }
 
 /// Returns the motions of the whole along which the cost is constant, orthogonal and of unit length in the metric of the
-/// diagonal.
-fn free_motions(model: &Model, system: &LinearSystem, scale: &[f64]) -> Vec<(Motion, Vec<f64>)> {
-    let mut free: Vec<(Motion, Vec<f64>)> = vec![];
+/// diagonal, and all that move something.
+fn free_motions(
+    model: &Model,
+    system: &LinearSystem,
+    scale: &[f64],
+) -> (Vec<(Motion, Vec<f64>)>, Vec<Motion>) {
+    let (mut free, mut possible): (Vec<(Motion, Vec<f64>)>, _) = (vec![], vec![]);
     for motion in Motion::ALL {
         let (mut v, mut moving) = (vec![0.0; scale.len()], 0);
         for place in &model.variables {
@@ -154,6 +158,7 @@ fn free_motions(model: &Model, system: &LinearSystem, scale: &[f64]) -> Vec<(Mot
         if moving < 2 || !(length > 0.0 && length.is_finite()) {
             continue;
         }
+        possible.push(motion);
         v.iter_mut().for_each(|v| *v /= length);
         if curvature(model, system, &v) >= MAX_CURVATURE {
             continue;
@@ -168,27 +173,27 @@ fn free_motions(model: &Model, system: &LinearSystem, scale: &[f64]) -> Vec<(Mot
             free.push((motion, v));
         }
     }
-    free
+    (free, possible)
 }
 
-/// Returns the words for motions: those about or along all axes have one.
-fn words(motions: &[(Motion, Vec<f64>)]) -> Vec<String> {
-    let axes = |is: fn(Motion) -> Option<usize>| -> Vec<&str> {
-        motions.iter().filter_map(|(motion, _)| ["x", "y", "z"].get(is(*motion)?).copied()).collect()
-    };
-    let along = axes(|motion| if let Motion::Translation(axis) = motion { Some(axis) } else { None });
-    let about = axes(|motion| if let Motion::Rotation(axis) = motion { Some(axis) } else { None });
+/// Returns the words for motions. Those along or about all axes on which something moves have one.
+fn words(motions: &[(Motion, Vec<f64>)], possible: &[Motion]) -> Vec<String> {
+    let translation =
+        |motion: &Motion| if let Motion::Translation(axis) = motion { Some(*axis) } else { None };
+    let rotation = |motion: &Motion| if let Motion::Rotation(axis) = motion { Some(*axis) } else { None };
     let mut words = vec![];
-    match along[..] {
-        [] => {}
-        [_, _, _] | ["x", "y"] => words.push("position".to_owned()),
-        _ => words.push(format!("position along {}", along.join(" and "))),
-    }
-    match about[..] {
-        [] => {}
-        [_, _, _] => words.push("orientation".to_owned()),
-        _ => words.push(format!("orientation about {}", about.join(" and "))),
-    }
+    let mut add = |name: &str, preposition: &str, axis: &dyn Fn(&Motion) -> Option<usize>| {
+        let free: Vec<&str> =
+            motions.iter().filter_map(|(motion, _)| ["x", "y", "z"].get(axis(motion)?).copied()).collect();
+        let all = possible.iter().filter(|motion| axis(motion).is_some()).count();
+        match free.len() {
+            0 => {}
+            n if n == all => words.push(name.to_owned()),
+            _ => words.push(format!("{name} {preposition} {}", free.join(" and "))),
+        }
+    };
+    add("position", "along", &translation);
+    add("orientation", "about", &rotation);
     if motions.iter().any(|(motion, _)| *motion == Motion::Scale) {
         words.push("scale".to_owned());
     }

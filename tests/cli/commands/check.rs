@@ -25,7 +25,9 @@ factor = { type = "between_se2", relative = { translation = [1.0, 0.0], angle = 
 fn a_gauge_that_nothing_holds_and_a_variable_that_nothing_touches_are_told() {
     let ran = check("pair.toml", PAIR).ended(0);
     assert!(ran.stdout.contains("nothing wrong with the document; 1 warning"), "{}", ran.stdout);
-    ran.complains("at these values, nothing constrains x");
+    ran.complains(
+        "at these values, nothing constrains the position and orientation of the whole; fix one pose",
+    );
     let alone = "[[variables]]\nkey = \"l\"\nvalue = { type = \"point2\", position = [0.0, 0.0] }\n";
     check("alone.toml", &(PAIR.to_owned() + alone)).ended(0).complains("no factor that takes part touches l");
     let held =
