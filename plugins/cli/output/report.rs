@@ -153,6 +153,7 @@ pub(crate) fn estimate(values: &Values, marginals: Option<&[Marginal]>) -> Strin
 fn fields(value: &dyn Variable) -> String {
     fn numbers(json: &Value, text: &mut String) {
         match json {
+            Value::Number(number) if number.is_u64() => *text += &format!(" {number}"),
             Value::Number(number) => {
                 let x = number.as_f64().unwrap_or(f64::NAN);
                 let is_short = x == 0.0 || (1e-3..1e7).contains(&x.abs());

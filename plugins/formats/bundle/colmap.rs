@@ -18,6 +18,7 @@
 //! `rigs.txt` and `frames.txt` are not read: each image has a pose of its own.
 use crate::error::FormatError;
 use crate::graph_format::{GraphFormat, GraphText};
+use crate::lines::lines;
 use manifactor_graph::{Graph, Values};
 use std::path::Path;
 
@@ -41,9 +42,22 @@ crate::register_graph_format!(GraphFormat {
     extensions: &[],
     folder: Some(IMAGES),
     begins: |text| text.starts_with("# Image list with two lines of data per image"),
-    parse: |text, path, reading| Ok(Model::parse(text, path)?.graph(reading.anchor)),
+    parse: |text, path, reading| {
+        let mut read = Model::parse(text, path)?.graph(reading.anchor);
+        read.notes.extend(path.parent().and_then(rig_note));
+        Ok(read)
+    },
     format: Some(format),
 });
+
+/// Returns a note if the model has cameras that are mounted together.
+fn rig_note(folder: &Path) -> Option<String> {
+    let rigs = std::fs::read_to_string(folder.join("rigs.txt")).ok()?;
+    let sensors = |line: &str| line.split_whitespace().nth(1).and_then(|n| n.parse::<u32>().ok());
+    let has_rig = lines(&rigs).any(|(_, line)| sensors(line).is_some_and(|n| n > 1));
+    let note = "rigs.txt: cameras that are mounted together keep no common pose: each image has its own";
+    has_rig.then(|| note.to_owned())
+}
 
 /// Returns the model of a graph as texts. What a graph does not have, such as names of images and colours, is that of the
 /// model in `like`, if that is one.

@@ -1,6 +1,6 @@
 //! Models of COLMAP: reading, writing, and solving.
 use manifactor_formats::colmap::{Camera, Image, ImagePoint, Lens, Model, Point};
-use manifactor_formats::{FormatError, GraphFormat, GraphRead};
+use manifactor_formats::{FormatError, GraphFormat, GraphRead, InformationRepair, ReadOptions};
 use manifactor_geometry::{CameraModel, Coordinates, Intrinsics, Radial, Se3, So3, UncalibratedModel};
 use manifactor_graph::{Fixed, Key};
 use manifactor_solve::{Auto, GaussNewton, Optimizer, Silent, solve};
@@ -128,7 +128,11 @@ fn what_the_estimate_does_not_change_is_kept() {
     let folder = written(&model(0.05));
     let (format, file) = GraphFormat::of_folder(folder.path()).unwrap();
     assert_eq!((format.name, file.file_name().unwrap().to_str()), ("COLMAP", Some("images.txt")));
-    let GraphRead { graph, values, .. } = Model::read(folder.path()).unwrap().graph(true);
+    fs::write(folder.path().join("rigs.txt"), "# rigs\n1 2 CAMERA 1 CAMERA 2 1 1 0 0 0 0 0 0\n").unwrap();
+    let reading = ReadOptions { repair: InformationRepair::Error, anchor: true, lenient: false };
+    let GraphRead { graph, values, notes } =
+        (format.parse)(&fs::read_to_string(&file).unwrap(), &file, reading).unwrap();
+    assert!(notes.iter().any(|note| note.starts_with("rigs.txt: ")), "{notes:?}");
     let solution = solve(&graph, &values, &Auto::default(), &mut Silent).unwrap();
     let text = format.format.unwrap()(&graph, &solution.values, Some(folder.path())).unwrap();
     assert!(text.notes.is_empty(), "{:?}", text.notes);
