@@ -106,7 +106,7 @@ fn images_share_the_intrinsics_of_their_camera() {
         let true_one = Vector5::new(700.0, 320.0, 240.0, -0.05, 0.0);
         let off = camera - true_one;
         assert!(
-            off[0].abs() < 5.0 && off[3].abs() < 0.01 && [off[1], off[2], off[4]] == [0.0; 3],
+            off[0].abs() < 5.0 && off[3].abs() < 0.05 && [off[1], off[2], off[4]] == [0.0; 3],
             "{camera}"
         );
     }
@@ -209,7 +209,7 @@ fn malformed_models_are_refused_with_the_line() {
         ),
         ("images.txt", "\n11 ", "\n10 ", "images.txt:7: image 10 is defined twice, first in line 5"),
         ("images.txt", "image #1.jpg", "image #0.jpg", "image a folder/image #0.jpg is defined twice"),
-        ("points3D.txt", " 200 100 50 ", " 200 100 ", "expected a whole number from 0 to 255"),
+        ("points3D.txt", " 200 100 50 ", " 300 100 50 ", "expected a whole number from 0 to 255, got `300`"),
         ("points3D.txt", "\n501 ", "\n500 ", "points3D.txt:5: point 500 is defined twice, first in line 4"),
         (
             "points3D.txt",
