@@ -67,6 +67,7 @@ __all__ = [
     "projection_extended_unified",
     "projection_inverse_depth",
     "projection_kannala_brandt",
+    "projection_radial",
     "projection_radial_tangential",
     "range_se2_point2",
     "range_se2_se2",
@@ -80,6 +81,10 @@ __all__ = [
     "stereo",
     "supporting_plane",
     "tangent_planes",
+    "uncalibrated_kannala_brandt",
+    "uncalibrated_pinhole",
+    "uncalibrated_radial",
+    "uncalibrated_radial_tangential",
     "upright",
     "upright_along",
     "vertical_orientation",
@@ -1452,6 +1457,32 @@ def projection_kannala_brandt(
     return Factor("projection_kannala_brandt", {"pixel": pixel, "camera": camera, "body_from_camera": body_from_camera})
 
 
+def projection_radial(
+    *,
+    pixel: Numbers,
+    camera: types.Radial,
+    body_from_camera: types.Se3 | None = None,
+) -> Factor:
+    """The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
+
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. With `body_from_camera`, the pose is that of a body on which the camera is mounted. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "l0"]
+    factor = { type = "projection_radial", pixel = [310.0, 262.5], camera = { f = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480, distortion = [0.1, 0.02] } }
+    noise = { sigma = 1.0 }
+    ```
+
+    Args:
+        pixel: Measured pixel, x right and y down.
+        camera: The calibrated camera.
+        body_from_camera: Pose of the camera in the frame of the variable. Default: the variable is the
+            pose of the camera.
+    """
+    return Factor("projection_radial", {"pixel": pixel, "camera": camera, "body_from_camera": body_from_camera})
+
+
 def projection_radial_tangential(
     *,
     pixel: Numbers,
@@ -1748,6 +1779,86 @@ def tangent_planes(*, box: Numbers, camera: types.Camera) -> Factor:
         camera: The calibrated camera.
     """
     return Factor("tangent_planes", {"box": box, "camera": camera})
+
+
+def uncalibrated_kannala_brandt(*, pixel: Numbers, body_from_camera: types.Se3 | None = None) -> Factor:
+    """The point is seen at `pixel` by a camera with unknown intrinsics: r = π(Rᵀ(X - t)) - z, in pixels.
+
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, the point, and the intrinsics (`kannala_brandt`), which many images can share. With `body_from_camera`, the pose is that of a body on which the camera is mounted. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "l0", "camera"]
+    factor = { type = "uncalibrated_kannala_brandt", pixel = [310.0, 262.5] }
+    noise = { sigma = 1.0 }
+    ```
+
+    Args:
+        pixel: Measured pixel, x right and y down.
+        body_from_camera: Pose of the camera in the frame of the variable. Default: the variable is the
+            pose of the camera.
+    """
+    return Factor("uncalibrated_kannala_brandt", {"pixel": pixel, "body_from_camera": body_from_camera})
+
+
+def uncalibrated_pinhole(*, pixel: Numbers, body_from_camera: types.Se3 | None = None) -> Factor:
+    """The point is seen at `pixel` by a camera with unknown intrinsics: r = π(Rᵀ(X - t)) - z, in pixels.
+
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, the point, and the intrinsics (`pinhole`), which many images can share. With `body_from_camera`, the pose is that of a body on which the camera is mounted. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "l0", "camera"]
+    factor = { type = "uncalibrated_pinhole", pixel = [310.0, 262.5] }
+    noise = { sigma = 1.0 }
+    ```
+
+    Args:
+        pixel: Measured pixel, x right and y down.
+        body_from_camera: Pose of the camera in the frame of the variable. Default: the variable is the
+            pose of the camera.
+    """
+    return Factor("uncalibrated_pinhole", {"pixel": pixel, "body_from_camera": body_from_camera})
+
+
+def uncalibrated_radial(*, pixel: Numbers, body_from_camera: types.Se3 | None = None) -> Factor:
+    """The point is seen at `pixel` by a camera with unknown intrinsics: r = π(Rᵀ(X - t)) - z, in pixels.
+
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, the point, and the intrinsics (`radial`), which many images can share. With `body_from_camera`, the pose is that of a body on which the camera is mounted. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "l0", "camera"]
+    factor = { type = "uncalibrated_radial", pixel = [310.0, 262.5] }
+    noise = { sigma = 1.0 }
+    ```
+
+    Args:
+        pixel: Measured pixel, x right and y down.
+        body_from_camera: Pose of the camera in the frame of the variable. Default: the variable is the
+            pose of the camera.
+    """
+    return Factor("uncalibrated_radial", {"pixel": pixel, "body_from_camera": body_from_camera})
+
+
+def uncalibrated_radial_tangential(*, pixel: Numbers, body_from_camera: types.Se3 | None = None) -> Factor:
+    """The point is seen at `pixel` by a camera with unknown intrinsics: r = π(Rᵀ(X - t)) - z, in pixels.
+
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, the point, and the intrinsics (`radial_tangential`), which many images can share. With `body_from_camera`, the pose is that of a body on which the camera is mounted. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "l0", "camera"]
+    factor = { type = "uncalibrated_radial_tangential", pixel = [310.0, 262.5] }
+    noise = { sigma = 1.0 }
+    ```
+
+    Args:
+        pixel: Measured pixel, x right and y down.
+        body_from_camera: Pose of the camera in the frame of the variable. Default: the variable is the
+            pose of the camera.
+    """
+    return Factor("uncalibrated_radial_tangential", {"pixel": pixel, "body_from_camera": body_from_camera})
 
 
 def upright(

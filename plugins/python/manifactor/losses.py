@@ -30,7 +30,7 @@ def cauchy(*, scale: Number | None = None) -> Loss:
     ```
 
     Args:
-        scale: The scale k of the formula above, in σ's. Default: 1.0.
+        scale: The scale k of the formula above, in σ's unless the text says otherwise. Default: 1.0.
     """
     return Loss("cauchy", {"scale": scale})
 
@@ -61,7 +61,7 @@ def dcs(*, scale: Number | None = None) -> Loss:
     ```
 
     Args:
-        scale: The scale k of the formula above, in σ's. Default: 1.0.
+        scale: The scale k of the formula above, in σ's unless the text says otherwise. Default: 1.0.
     """
     return Loss("dcs", {"scale": scale})
 
@@ -74,7 +74,7 @@ def fair(*, scale: Number | None = None) -> Loss:
     ```
 
     Args:
-        scale: The scale k of the formula above, in σ's. Default: 1.4.
+        scale: The scale k of the formula above, in σ's unless the text says otherwise. Default: 1.4.
     """
     return Loss("fair", {"scale": scale})
 
@@ -87,7 +87,7 @@ def geman_mcclure(*, scale: Number | None = None) -> Loss:
     ```
 
     Args:
-        scale: The scale k of the formula above, in σ's. Default: 1.0.
+        scale: The scale k of the formula above, in σ's unless the text says otherwise. Default: 1.0.
     """
     return Loss("geman_mcclure", {"scale": scale})
 
@@ -100,7 +100,7 @@ def huber(*, scale: Number | None = None) -> Loss:
     ```
 
     Args:
-        scale: The scale k of the formula above, in σ's. Default: 1.345.
+        scale: The scale k of the formula above, in σ's unless the text says otherwise. Default: 1.345.
     """
     return Loss("huber", {"scale": scale})
 
@@ -116,7 +116,7 @@ def l1(*, scale: Number | None = None) -> Loss:
     ```
 
     Args:
-        scale: The scale k of the formula above, in σ's. Default: 1.0.
+        scale: The scale k of the formula above, in σ's unless the text says otherwise. Default: 1.0.
     """
     return Loss("l1", {"scale": scale})
 
@@ -158,7 +158,7 @@ def tukey(*, scale: Number | None = None) -> Loss:
     ```
 
     Args:
-        scale: The scale k of the formula above, in σ's. Default: 4.685.
+        scale: The scale k of the formula above, in σ's unless the text says otherwise. Default: 4.685.
     """
     return Loss("tukey", {"scale": scale})
 
@@ -171,6 +171,6 @@ def welsch(*, scale: Number | None = None) -> Loss:
     ```
 
     Args:
-        scale: The scale k of the formula above, in σ's. Default: 2.985.
+        scale: The scale k of the formula above, in σ's unless the text says otherwise. Default: 2.985.
     """
     return Loss("welsch", {"scale": scale})

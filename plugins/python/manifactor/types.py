@@ -137,6 +137,23 @@ class KannalaBrandt(TypedDict, total=False):
     distortion: Required[Numbers]
 
 
+class Radial(TypedDict, total=False):
+    """A camera with one focal length and two coefficients of radial distortion."""
+
+    #: Focal length, in pixels.
+    f: Required[Number]
+    #: Principal point, in pixels.
+    cx: Required[Number]
+    #: Principal point, in pixels.
+    cy: Required[Number]
+    #: Size of the image, in pixels.
+    width: Required[int]
+    #: Size of the image, in pixels.
+    height: Required[int]
+    #: Coefficients k₁ and k₂.
+    distortion: Required[Numbers]
+
+
 class RadialTangential(TypedDict, total=False):
     """A camera with radial and tangential lens distortion, with four, five or eight coefficients."""
 

@@ -17,10 +17,14 @@ __all__ = [
     "BalCamera",
     "DualQuadric",
     "ImuBias",
+    "KannalaBrandt",
+    "Pinhole",
     "Plane",
     "Point1",
     "Point2",
     "Point3",
+    "Radial",
+    "RadialTangential",
     "S2",
     "Se2",
     "Se3",
@@ -195,6 +199,154 @@ class ImuBias(Variable):
     def accelerometer(self) -> NDArray[np.float64]:
         """Bias of the accelerometer along x, y and z, in m/s²."""
         return self.__getattr__("accelerometer")  # type: ignore[no-any-return]
+
+
+class KannalaBrandt(Variable):
+    """The intrinsics of a camera, for `uncalibrated_kannala_brandt`.
+
+    Tangent (fx, fy, cx, cy, k1, k2, k3, k4), each additive; the size of the image is a constant. Several images can share them.
+
+    ```toml
+    [values]
+    camera = { type = "kannala_brandt", fx = 285.0, fy = 285.0, cx = 424.0, cy = 400.0, width = 848, height = 800, distortion = [0.01, 0.02, 0.0, 0.0] }
+    ```
+
+    Args:
+        fx: Focal length along x, in pixels.
+        fy: Focal length along y, in pixels.
+        cx: Principal point, in pixels.
+        cy: Principal point, in pixels.
+        width: Size of the image, in pixels.
+        height: Size of the image, in pixels.
+        distortion: Coefficients k₁, k₂, k₃, k₄.
+    """
+
+    TYPE: ClassVar[str] = "kannala_brandt"
+    SHAPE: ClassVar[str] = ""
+    TANGENT: ClassVar[tuple[str, ...]] = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {}
+
+    def __new__(
+        cls,
+        *,
+        fx: Number,
+        fy: Number,
+        cx: Number,
+        cy: Number,
+        width: int,
+        height: int,
+        distortion: Numbers,
+    ) -> Self:
+        return super().__new__(cls, "variable", "kannala_brandt", {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "width": width, "height": height, "distortion": distortion})
+
+    @property
+    def fx(self) -> float:
+        """Focal length along x, in pixels."""
+        return self.__getattr__("fx")  # type: ignore[no-any-return]
+
+    @property
+    def fy(self) -> float:
+        """Focal length along y, in pixels."""
+        return self.__getattr__("fy")  # type: ignore[no-any-return]
+
+    @property
+    def cx(self) -> float:
+        """Principal point, in pixels."""
+        return self.__getattr__("cx")  # type: ignore[no-any-return]
+
+    @property
+    def cy(self) -> float:
+        """Principal point, in pixels."""
+        return self.__getattr__("cy")  # type: ignore[no-any-return]
+
+    @property
+    def width(self) -> NDArray[np.float64]:
+        """Size of the image, in pixels."""
+        return self.__getattr__("width")  # type: ignore[no-any-return]
+
+    @property
+    def height(self) -> NDArray[np.float64]:
+        """Size of the image, in pixels."""
+        return self.__getattr__("height")  # type: ignore[no-any-return]
+
+    @property
+    def distortion(self) -> NDArray[np.float64]:
+        """Coefficients k₁, k₂, k₃, k₄."""
+        return self.__getattr__("distortion")  # type: ignore[no-any-return]
+
+
+class Pinhole(Variable):
+    """The intrinsics of a camera, for `uncalibrated_pinhole`.
+
+    Tangent (fx, fy, cx, cy), each additive; the size of the image is a constant. Several images can share them.
+
+    ```toml
+    [values]
+    camera = { type = "pinhole", fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }
+    ```
+
+    Args:
+        fx: Focal length along x, in pixels.
+        fy: Focal length along y, in pixels.
+        cx: Principal point, in pixels.
+        cy: Principal point, in pixels.
+        skew: Contribution of y/z to u, in pixels.
+        width: Size of the image, in pixels.
+        height: Size of the image, in pixels.
+    """
+
+    TYPE: ClassVar[str] = "pinhole"
+    SHAPE: ClassVar[str] = ""
+    TANGENT: ClassVar[tuple[str, ...]] = ("fx", "fy", "cx", "cy")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {}
+
+    def __new__(
+        cls,
+        *,
+        fx: Number,
+        fy: Number,
+        cx: Number,
+        cy: Number,
+        width: int,
+        height: int,
+        skew: Number | None = None,
+    ) -> Self:
+        return super().__new__(cls, "variable", "pinhole", {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "width": width, "height": height, "skew": skew})
+
+    @property
+    def fx(self) -> float:
+        """Focal length along x, in pixels."""
+        return self.__getattr__("fx")  # type: ignore[no-any-return]
+
+    @property
+    def fy(self) -> float:
+        """Focal length along y, in pixels."""
+        return self.__getattr__("fy")  # type: ignore[no-any-return]
+
+    @property
+    def cx(self) -> float:
+        """Principal point, in pixels."""
+        return self.__getattr__("cx")  # type: ignore[no-any-return]
+
+    @property
+    def cy(self) -> float:
+        """Principal point, in pixels."""
+        return self.__getattr__("cy")  # type: ignore[no-any-return]
+
+    @property
+    def width(self) -> NDArray[np.float64]:
+        """Size of the image, in pixels."""
+        return self.__getattr__("width")  # type: ignore[no-any-return]
+
+    @property
+    def height(self) -> NDArray[np.float64]:
+        """Size of the image, in pixels."""
+        return self.__getattr__("height")  # type: ignore[no-any-return]
+
+    @property
+    def skew(self) -> NDArray[np.float64]:
+        """Contribution of y/z to u, in pixels."""
+        return self.__getattr__("skew")  # type: ignore[no-any-return]
 
 
 class Plane(Variable):
@@ -533,6 +685,148 @@ class Point3(Vector):
     def z(self) -> Any:
         """The third component."""
         return computed(self, "z")
+
+
+class Radial(Variable):
+    """The intrinsics of a camera, for `uncalibrated_radial`.
+
+    Tangent (f, cx, cy, k1, k2), each additive; the size of the image is a constant. Several images can share them.
+
+    ```toml
+    [values]
+    camera = { type = "radial", f = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480, distortion = [0.1, 0.02] }
+    ```
+
+    Args:
+        f: Focal length, in pixels.
+        cx: Principal point, in pixels.
+        cy: Principal point, in pixels.
+        width: Size of the image, in pixels.
+        height: Size of the image, in pixels.
+        distortion: Coefficients k₁ and k₂.
+    """
+
+    TYPE: ClassVar[str] = "radial"
+    SHAPE: ClassVar[str] = ""
+    TANGENT: ClassVar[tuple[str, ...]] = ("f", "cx", "cy", "k1", "k2")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {}
+
+    def __new__(
+        cls,
+        *,
+        f: Number,
+        cx: Number,
+        cy: Number,
+        width: int,
+        height: int,
+        distortion: Numbers,
+    ) -> Self:
+        return super().__new__(cls, "variable", "radial", {"f": f, "cx": cx, "cy": cy, "width": width, "height": height, "distortion": distortion})
+
+    @property
+    def f(self) -> float:
+        """Focal length, in pixels."""
+        return self.__getattr__("f")  # type: ignore[no-any-return]
+
+    @property
+    def cx(self) -> float:
+        """Principal point, in pixels."""
+        return self.__getattr__("cx")  # type: ignore[no-any-return]
+
+    @property
+    def cy(self) -> float:
+        """Principal point, in pixels."""
+        return self.__getattr__("cy")  # type: ignore[no-any-return]
+
+    @property
+    def width(self) -> NDArray[np.float64]:
+        """Size of the image, in pixels."""
+        return self.__getattr__("width")  # type: ignore[no-any-return]
+
+    @property
+    def height(self) -> NDArray[np.float64]:
+        """Size of the image, in pixels."""
+        return self.__getattr__("height")  # type: ignore[no-any-return]
+
+    @property
+    def distortion(self) -> NDArray[np.float64]:
+        """Coefficients k₁ and k₂."""
+        return self.__getattr__("distortion")  # type: ignore[no-any-return]
+
+
+class RadialTangential(Variable):
+    """The intrinsics of a camera, for `uncalibrated_radial_tangential`.
+
+    Tangent (fx, fy, cx, cy, k1, k2, p1, p2), each additive; the size of the image is a constant. Several images can share them.
+
+    ```toml
+    [values]
+    camera = { type = "radial_tangential", fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480, distortion = [0.1, 0.02, 0.0, 0.0, 0.0] }
+    ```
+
+    Args:
+        fx: Focal length along x, in pixels.
+        fy: Focal length along y, in pixels.
+        cx: Principal point, in pixels.
+        cy: Principal point, in pixels.
+        width: Size of the image, in pixels.
+        height: Size of the image, in pixels.
+        distortion: Coefficients k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆ in OpenCV's order: the first four, five or
+            all.
+    """
+
+    TYPE: ClassVar[str] = "radial_tangential"
+    SHAPE: ClassVar[str] = ""
+    TANGENT: ClassVar[tuple[str, ...]] = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
+    FIELDS: ClassVar[Mapping[str, int | slice]] = {}
+
+    def __new__(
+        cls,
+        *,
+        fx: Number,
+        fy: Number,
+        cx: Number,
+        cy: Number,
+        width: int,
+        height: int,
+        distortion: Numbers,
+    ) -> Self:
+        return super().__new__(cls, "variable", "radial_tangential", {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "width": width, "height": height, "distortion": distortion})
+
+    @property
+    def fx(self) -> float:
+        """Focal length along x, in pixels."""
+        return self.__getattr__("fx")  # type: ignore[no-any-return]
+
+    @property
+    def fy(self) -> float:
+        """Focal length along y, in pixels."""
+        return self.__getattr__("fy")  # type: ignore[no-any-return]
+
+    @property
+    def cx(self) -> float:
+        """Principal point, in pixels."""
+        return self.__getattr__("cx")  # type: ignore[no-any-return]
+
+    @property
+    def cy(self) -> float:
+        """Principal point, in pixels."""
+        return self.__getattr__("cy")  # type: ignore[no-any-return]
+
+    @property
+    def width(self) -> NDArray[np.float64]:
+        """Size of the image, in pixels."""
+        return self.__getattr__("width")  # type: ignore[no-any-return]
+
+    @property
+    def height(self) -> NDArray[np.float64]:
+        """Size of the image, in pixels."""
+        return self.__getattr__("height")  # type: ignore[no-any-return]
+
+    @property
+    def distortion(self) -> NDArray[np.float64]:
+        """Coefficients k₁, k₂, p₁, p₂, k₃, k₄, k₅, k₆ in OpenCV's order: the first four, five or all."""
+        return self.__getattr__("distortion")  # type: ignore[no-any-return]
 
 
 class S2(Vector):
@@ -937,10 +1231,14 @@ BY_TYPE: dict[str, type[Variable]] = {
     "bal_camera": BalCamera,
     "dual_quadric": DualQuadric,
     "imu_bias": ImuBias,
+    "kannala_brandt": KannalaBrandt,
+    "pinhole": Pinhole,
     "plane": Plane,
     "point1": Point1,
     "point2": Point2,
     "point3": Point3,
+    "radial": Radial,
+    "radial_tangential": RadialTangential,
     "s2": S2,
     "se2": Se2,
     "se3": Se3,

@@ -184,6 +184,10 @@ VALUES: list[Any] = [
     mf.Velocity(linear=[3, 4, 5]),
     mf.ImuBias(gyroscope=[0, 1, 2], accelerometer=[3, 4, 5]),
     mf.BalCamera(translation=[0, 1, 2], rotation=[0, 0, 0.6, 0.8], focal_length=500, k1=0.1, k2=0),
+    mf.Pinhole(fx=500, fy=501, cx=320, cy=240, width=640, height=480),
+    mf.Radial(f=500, cx=320, cy=240, width=640, height=480, distortion=[0.1, 0]),
+    mf.RadialTangential(fx=500, fy=501, cx=320, cy=240, width=640, height=480, distortion=[0.1, 0, 0.01, 0]),
+    mf.KannalaBrandt(fx=300, fy=301, cx=320, cy=240, width=640, height=480, distortion=[0.1, 0, 0.01, 0]),
 ]
 
 

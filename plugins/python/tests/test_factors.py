@@ -341,7 +341,7 @@ def test_a_formula_is_made_again_if_a_name_has_another_object() -> None:
 
     @mf.factor
     def uses(p: mf.Point1) -> Any:
-        return scaled(p[0]) * sum(float(item) for item in TABLE)
+        return scaled(p) * sum(float(item) for item in TABLE)
 
     values = mf.Values({"p": mf.Point1(position=[1])})
 
