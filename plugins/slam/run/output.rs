@@ -39,6 +39,7 @@ mod own_map;
 pub mod record;
 pub mod report;
 mod shapes;
+mod truth_frame;
 
 pub use folder::{FolderError, OutputFolder};
 pub use map::{MapError, map_of};

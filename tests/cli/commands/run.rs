@@ -215,3 +215,67 @@ fn what_files_cannot_hold_is_said_when_they_are_written() {
         manifactor("simulate examples/desk/desk.toml --lines --set source.trajectory.frames=2").ended(0);
     names.complains("written is the source of the first variant");
 }
+
+const CAMERA: &str = "camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
+
+#[test]
+fn errors_of_objects_do_not_depend_on_the_frame_of_the_odometry() {
+    let run = "source = { type = 'simulated', scene = { objects = 5 }, trajectory = { frames = 40 } }\n";
+    let recorded = format!("source = {{ type = \"recorded\", folder = \"recording\", {CAMERA} }}\n");
+    let folder = folder(&[("run.toml", run), ("recorded.toml", &recorded)]);
+    let recording = path(&folder, "recording");
+    manifactor(&format!("simulate {} --out {recording}", path(&folder, "run.toml"))).ended(0);
+    let error = |name: &str| {
+        let (document, out) = (path(&folder, "recorded.toml"), path(&folder, name));
+        let json = manifactor(&format!("run {document} --out {out} --json")).json();
+        json["variants"][0]["landmarks"]["estimate"]["rmse"]["position"].as_f64().unwrap()
+    };
+    let before = error("before");
+    let odometry = std::fs::read_to_string(format!("{recording}/odometry.txt")).unwrap();
+    let moved = odometry.lines().map(|line| {
+        let mut words: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
+        if let Some(x) = words.get_mut(1).filter(|_| !line.starts_with('#')) {
+            *x = (x.parse::<f64>().unwrap() + 5.0).to_string();
+        }
+        words.join(" ") + "\n"
+    });
+    std::fs::write(format!("{recording}/odometry.txt"), moved.collect::<String>()).unwrap();
+    let after = error("after");
+    assert!(before < 0.5 && after < 2.0 * before + 0.05, "{before} {after}");
+}
+
+#[test]
+fn frames_out_of_order_are_left_out_and_images_of_one_time_are_one_frame() {
+    let line = |time: f64, x: f64, left: f64| {
+        format!(
+            "{{\"timestamp\": {time}, \"pose\": {{\"translation\": [{x}, 0, 0], \"rotation\": [0, 0, 0, 1]}}, \"boxes\": \
+             [{{\"class\": \"cup\", \"score\": 0.9, \"box\": [{left}, 10, {}, 60]}}]}}\n",
+            left + 50.0
+        )
+    };
+    let text = [
+        (0.0, 0.0, 10.0),
+        (0.1, 0.1, 10.0),
+        (0.1, 0.1, 200.0),
+        (0.3, 0.3, 10.0),
+        (0.2, 0.2, 10.0),
+        (0.4, 0.4, 10.0),
+    ]
+    .map(|(time, x, left)| line(time, x, left))
+    .concat();
+    let source =
+        format!("source = {{ type = \"json_lines\", file = \"f.jsonl\", up = [0, -1, 0], {CAMERA} }}\n");
+    let folder = folder(&[("run.toml", &source), ("f.jsonl", &text)]);
+    let out = path(&folder, "out");
+    let ran = manifactor(&format!("run {} --out {out} --json", path(&folder, "run.toml")));
+    let warnings = ran.json()["variants"][0]["warnings"].to_string();
+    assert!(
+        warnings.contains("the frame at 0.2 s does not come after the one before, at 0.3 s"),
+        "{warnings}"
+    );
+    let trajectory = std::fs::read_to_string(format!("{out}/estimate/trajectory.txt")).unwrap();
+    let times = trajectory.lines().filter(|line| !line.starts_with('#'));
+    let times: Vec<f64> =
+        times.map(|line| line.split_whitespace().next().unwrap().parse().unwrap()).collect();
+    assert_eq!(times, [0.0, 0.1, 0.3, 0.4]);
+}

@@ -22,6 +22,9 @@ use serde::Serialize;
 /// A box of a stalled fit is removed if it overlaps less with the ellipsoid (intersection over union).
 const MIN_BOX_OVERLAP: f64 = 0.1;
 
+/// Number of times that the fit of an object is continued when its iterations run out.
+const MAX_CONTINUATIONS: usize = 10;
+
 /// Share of boxes without an ellipsoid that explains them, above which the poses or the camera are probably
 /// wrong. On TUM RGB-D it is below 0.02. In a simulated recording with quaternions in the
 /// wrong order, poses of the body, inverted poses or wrong intrinsics, it is 0.23 to 0.57.
@@ -205,7 +208,14 @@ impl FittedObjects {
                 break;
             }
             let (graph, start) = object_graph(&keys, entries.into_iter(), &values);
-            let solved = settings.solver.solve(&graph, &start, &mut Silent)?;
+            let mut solved = settings.solver.solve(&graph, &start, &mut Silent)?;
+            for _ in 0..MAX_CONTINUATIONS {
+                // a small problem takes many cheap iterations to rounding error
+                if solved.outcome.termination != Termination::MaxIterations {
+                    break;
+                }
+                solved = settings.solver.solve(&graph, &solved.values, &mut Silent)?;
+            }
             for key in keys {
                 if let Some(value) = solved.values.variable(key.as_str()) {
                     values.insert_boxed(key.clone(), value.erased().clone_box());

@@ -1,6 +1,6 @@
 //! The frames of a sequence, one by one.
 use super::pose_graph::{PoseFactor, PoseGraphChanges, correct_frames};
-use super::{Detection, Observation, Sequence, UnusedInput};
+use super::{Detection, Observation, Sequence, UnusedInput, remove_repeated};
 
 /// Frames of a sequence in order of arrival. A reading of the accelerometer belongs to the first frame at or
 /// after its time.
@@ -47,6 +47,9 @@ impl<S: AsRef<Sequence>> Iterator for Observations<S> {
     }
 }
 
+/// Largest difference between two equal poses. Unit: rad and m.
+const SAME_POSE: f64 = 1e-9;
+
 impl Sequence {
     /// Appends a frame with its boxes and readings, and [applies](Self::apply_pose_graph) its changes of the pose
     /// graph.
@@ -58,6 +61,35 @@ impl Sequence {
         self.detections.extend(observation.detections.into_iter().map(|d| Detection { frame, ..d }));
         self.accelerometer.extend(observation.accelerometer);
         self.unused.extend(observation.unused);
+    }
+
+    /// Appends a frame as [`push`](Self::push). Images of one time and pose, by several cameras, are one frame. A frame
+    /// that does not come after the one before becomes unused input.
+    pub(crate) fn append(&mut self, observation: Observation) {
+        let Some(last) = self.frames.last().cloned() else { return self.push(observation) };
+        let timestamp = observation.frame.timestamp;
+        if timestamp > last.timestamp {
+            return self.push(observation);
+        }
+        let apart = last.world_from_camera.between(&observation.frame.world_from_camera).log().norm();
+        if timestamp < last.timestamp || apart > SAME_POSE {
+            let fault = format!(
+                "the frame at {timestamp} s does not come after the one before, at {} s: it is left out with its changes",
+                last.timestamp
+            );
+            self.unused.push(UnusedInput::Image { boxes: observation.detections.len(), fault });
+            return;
+        }
+        let frame = self.frames.len() - 1;
+        let own = self.detections.partition_point(|detection| detection.frame < frame);
+        let mut boxes = self.detections.split_off(own);
+        boxes.extend(observation.detections.into_iter().map(|d| Detection { frame, ..d }));
+        let repeated = remove_repeated(&mut boxes);
+        self.unused.extend(repeated.into_iter().map(|repeated| UnusedInput::repeated(timestamp, repeated)));
+        self.detections.extend(boxes);
+        self.accelerometer.extend(observation.accelerometer);
+        self.unused.extend(observation.unused);
+        self.apply_pose_graph(timestamp, observation.pose_graph);
     }
 
     /// Corrects poses, and adds, replaces and removes factors on poses before the next frame. Changes of unknown

@@ -57,7 +57,7 @@ impl FrameStream {
                     let (field, fault) = ("after the last image".into(), error.to_string());
                     all.unused.push(UnusedInput::PoseGraph { timestamp, field, fault });
                 }
-                observation => all.push(observation?),
+                observation => all.append(observation?),
             }
         }
         Ok(all)

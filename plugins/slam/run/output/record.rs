@@ -135,7 +135,8 @@ impl VariantRecord {
     /// Creates the record of an estimate.
     pub fn new(variant: &RunVariant, estimate: &Estimate) -> Self {
         let settings: &RunSettings = &variant.settings;
-        let drawn = drawn::RecordFrames::of(estimate, *settings.evaluation.max_time_difference);
+        let within = *settings.evaluation.max_time_difference;
+        let drawn = drawn::RecordFrames::of(estimate, within);
         let (frames, alignment) = frames::frames(estimate, &settings.evaluation, &drawn);
         Self {
             name: variant.name.clone(),
@@ -146,7 +147,7 @@ impl VariantRecord {
             alignment,
             relative_over: settings.evaluation.relative_over.get(),
             frames,
-            objects: objects::objects(estimate, &drawn),
+            objects: objects::objects(estimate, &drawn, within),
             variables: variables::variables(&settings.own, estimate),
             cost: cost(estimate),
             residuals: factors::residuals(estimate),

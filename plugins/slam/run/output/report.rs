@@ -206,8 +206,11 @@ impl VariantReport {
         let truth = estimate.sequence.ground_truth.as_ref();
         let poses = [estimate.odometry(), estimate.trajectory()];
         let trajectory = trajectory::compare(truth, &poses, &settings.evaluation, &mut warnings);
-        let after = landmarks::in_truth_frame(estimate, estimate.landmarks());
-        let before = landmarks::in_truth_frame(estimate, estimate.initial_landmarks());
+        let within = *settings.evaluation.max_time_difference;
+        let errors = |landmarks, poses: &[_]| landmarks::in_truth_frame(estimate, landmarks, poses, within);
+        let [odometry, trajectory_poses] = &poses;
+        let before = errors(estimate.initial_landmarks(), odometry);
+        let after = errors(estimate.landmarks(), trajectory_poses);
         let objects = objects(estimate, &after);
         warnings.extend(super::shapes::shape_warnings(estimate));
         let noise = estimate.components.last().and_then(|found| found.odometry);
@@ -309,8 +312,8 @@ impl SolveReport {
 }
 
 /// Returns the errors of objects whose true shape is known.
-pub(super) fn object_errors(estimate: &Estimate) -> Vec<(ObjectId, LandmarkError)> {
-    let errors = landmarks::in_truth_frame(estimate, estimate.landmarks());
+pub(super) fn object_errors(estimate: &Estimate, within: f64) -> Vec<(ObjectId, LandmarkError)> {
+    let errors = landmarks::in_truth_frame(estimate, estimate.landmarks(), &estimate.trajectory(), within);
     errors.into_iter().map(|(landmark, error)| (landmark.object.id, error)).collect()
 }
 

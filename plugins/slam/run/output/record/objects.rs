@@ -57,9 +57,9 @@ pub struct TrueCuboid {
     pub half_extents: [f64; 3],
 }
 
-pub(super) fn objects(estimate: &Estimate, drawn: &RecordFrames) -> Vec<ObjectRecord> {
+pub(super) fn objects(estimate: &Estimate, drawn: &RecordFrames, within: f64) -> Vec<ObjectRecord> {
     let truths = estimate.sequence.ground_truth.as_ref().map_or(&[][..], |truth| &truth.objects);
-    let (errors, states) = (object_errors(estimate), FactorStates::of(estimate));
+    let (errors, states) = (object_errors(estimate, within), FactorStates::of(estimate));
     let detected = estimate.mapping.objects.iter().map(|object| {
         let quadric = |values: &manifactor_graph::Values| {
             values.get::<DualQuadric>(&object.key).ok().map(|q| moved(q, &drawn.estimate))

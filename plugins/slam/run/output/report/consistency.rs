@@ -1,5 +1,6 @@
 //! Consistency of errors with the estimated covariances.
 use super::trajectory::by_first_pose;
+use crate::output::truth_frame::truth_from_map;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Key, Manifold};
 use manifactor_mapping::estimate::Estimate;
@@ -41,7 +42,9 @@ impl ConsistencyReport {
             let error = pair.estimate.local(&pair.truth);
             normalized(&DVector::from_column_slice(error.as_slice()), covariance.clone())
         });
-        let truth_from_map = estimate.mapping.frame.map_from_odometry.inverse();
+        let within = *settings.max_time_difference;
+        let truth_from_map =
+            truth_from_map(estimate, &estimate.trajectory(), within).unwrap_or(Se3::identity());
         let landmarks = estimate.landmarks();
         let objects = landmarks.iter().filter_map(|landmark| {
             let pose: Se3 = truth_from_map.compose(&landmark.quadric.pose);

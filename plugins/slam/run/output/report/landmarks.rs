@@ -1,3 +1,5 @@
+use crate::output::truth_frame::truth_from_map;
+use manifactor_formats::tum::StampedPose;
 use manifactor_mapping::estimate::{Estimate, LandmarkEstimate};
 use manifactor_quadric::{Cuboid, LandmarkError};
 use serde::Serialize;
@@ -22,13 +24,15 @@ pub struct LandmarkSummary {
     pub rmse: LandmarkError,
 }
 
-/// Returns the error of each landmark with known truth. Simulated truth is in the odometry frame, which may
-/// differ from the map frame.
+/// Returns the error of each landmark with known truth, in the [frame of the ground truth](truth_from_map) by the poses
+/// that belong to the landmarks. None if that frame is unknown.
 pub(super) fn in_truth_frame<'a>(
     estimate: &Estimate,
     landmarks: Vec<LandmarkEstimate<'a>>,
+    poses: &[StampedPose],
+    within: f64,
 ) -> Vec<(LandmarkEstimate<'a>, LandmarkError)> {
-    let truth_from_map = estimate.mapping.frame.map_from_odometry.inverse();
+    let Some(truth_from_map) = truth_from_map(estimate, poses, within) else { return vec![] };
     let compare = |landmark: LandmarkEstimate<'a>| {
         let mut quadric = *landmark.quadric;
         quadric.pose = truth_from_map.compose(&quadric.pose);
