@@ -47,6 +47,24 @@ impl<S: AsRef<Sequence>> Iterator for Observations<S> {
     }
 }
 
+impl Observation {
+    /// Adds an image of the same time, by another camera.
+    pub(crate) fn join(&mut self, other: Self) {
+        self.detections.extend(other.detections);
+        self.unused.extend(other.unused);
+        self.unused.extend(without_repeated(self.frame.timestamp, &mut self.detections));
+        self.accelerometer.extend(other.accelerometer);
+        self.pose_graph.factors.extend(other.pose_graph.factors);
+        self.pose_graph.removed.extend(other.pose_graph.removed);
+        self.pose_graph.corrected.extend(other.pose_graph.corrected);
+    }
+}
+
+/// Removes the boxes of an image that show what another one shows, and returns them as unused input.
+fn without_repeated(timestamp: f64, boxes: &mut Vec<Detection>) -> Vec<UnusedInput> {
+    remove_repeated(boxes).into_iter().map(|repeated| UnusedInput::repeated(timestamp, repeated)).collect()
+}
+
 /// Largest difference between two equal poses. Unit: rad and m.
 const SAME_POSE: f64 = 1e-9;
 
@@ -84,8 +102,7 @@ impl Sequence {
         let own = self.detections.partition_point(|detection| detection.frame < frame);
         let mut boxes = self.detections.split_off(own);
         boxes.extend(observation.detections.into_iter().map(|d| Detection { frame, ..d }));
-        let repeated = remove_repeated(&mut boxes);
-        self.unused.extend(repeated.into_iter().map(|repeated| UnusedInput::repeated(timestamp, repeated)));
+        self.unused.extend(without_repeated(timestamp, &mut boxes));
         self.detections.extend(boxes);
         self.accelerometer.extend(observation.accelerometer);
         self.unused.extend(observation.unused);

@@ -186,22 +186,26 @@ impl<I: Iterator<Item = Result<PoseOrImage, SourceError>>> InterpolatedFrames<I>
         }
     }
 
-    /// Releases the images that a pose follows, and images for which none has come; at the end, all. The first
+    /// Releases the images that a later pose follows, those of one time as one, and images for which none has come; at the end, all. The first
     /// one gets the corrections that have arrived, the last one the factors.
     fn release(&mut self, is_end: bool) {
         let last = self.poses.last().map_or(f64::NEG_INFINITY, |pose| pose.timestamp);
         // the newest image may have a wrong timestamp
         let newest = self.images.iter().nth_back(1).map_or(last, |image| image.frame.timestamp);
-        let until = last.max(newest - MAX_DELAY_S);
-        let ready = self.images.partition_point(|image| is_end || image.frame.timestamp <= until);
-        let mut released = vec![];
+        // an image at the time of the last pose waits: one of another camera may come at the same time
+        let is_ready = |time: f64| time < last || time <= newest - MAX_DELAY_S;
+        let ready = self.images.partition_point(|image| is_end || is_ready(image.frame.timestamp));
+        let mut released: Vec<Result<Observation, SourceError>> = vec![];
         for mut image in self.images.drain(..ready).collect::<Vec<_>>() {
             let timestamp = image.frame.timestamp;
             match pose_at(&self.poses, timestamp, self.max_gap) {
-                Ok(pose) => {
-                    self.set_pose(&mut image, pose);
-                    released.push(Ok(image));
-                }
+                Ok(pose) => match released.last_mut() {
+                    Some(Ok(before)) if before.frame.timestamp == timestamp => before.join(image),
+                    _ => {
+                        self.set_pose(&mut image, pose);
+                        released.push(Ok(image));
+                    }
+                },
                 Err(why) => {
                     let boxes = image.detections.len();
                     self.keep_for_next(image);

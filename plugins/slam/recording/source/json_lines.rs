@@ -41,7 +41,8 @@ pub use line::{FrameLine, format_line, parse};
 /// With `cameras`, further cameras on the same body have names. A box from one of them names it in the field `camera`.
 ///
 /// With `max_pose_gap`, poses and images may have different timestamps, at different rates. A line has `pose`,
-/// `boxes` or both. An image waits for the first pose after it, and may arrive ten seconds late. An image
+/// `boxes` or both. An image waits for the first pose after it. Images of one time, by several cameras, are one frame; an image that
+/// arrives when one of a later time has been used is skipped and reported by `manifactor online`. An image
 /// without poses around it is skipped and reported.
 ///
 /// An item of these lists that cannot be used is skipped and reported; the frame stays.
