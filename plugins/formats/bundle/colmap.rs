@@ -11,9 +11,11 @@
 //! `image<id>` and `point<id>`. Each image point with a point in space becomes an `uncalibrated_…` factor with a standard
 //! deviation of one pixel; images share the intrinsics of their camera.
 //!
-//! Held are: what a camera model does not have, such as k₂ of `SIMPLE_RADIAL`; principal points, as in COLMAP's own
-//! bundle adjustment; what no image point observes; points in fewer than two images; and, unless the reader is asked not
-//! to, the pose of one image and a direction of another, for the [gauge](crate::bal).
+//! Held are:
+//! - principal points, as in COLMAP's own bundle adjustment, and coefficients that a camera model lacks, such as k₂ of
+//!   `SIMPLE_RADIAL`;
+//! - cameras and images without observations, and points in fewer than two images;
+//! - by default, the pose of one image and one direction of a second one, for the [gauge](crate::bal).
 //!
 //! `rigs.txt` and `frames.txt` are not read: each image has a pose of its own.
 use crate::error::FormatError;
@@ -59,8 +61,8 @@ fn rig_note(folder: &Path) -> Option<String> {
     has_rig.then(|| note.to_owned())
 }
 
-/// Returns the model of a graph as texts. What a graph does not have, such as names of images and colours, is that of the
-/// model in `like`, if that is one.
+/// Returns the model of a graph as texts. Names of images and colours come from the model in the folder `like`, if there is
+/// one.
 fn format(graph: &Graph, values: &Values, like: Option<&Path>) -> Result<GraphText, FormatError> {
     let like = like.filter(|folder| folder.join(IMAGES).is_file());
     let (model, notes) = match like {

@@ -285,7 +285,7 @@ pub struct Detection {
 /// detector with a limit of 0.5) no two boxes of one class overlap by more than 0.5.
 const MAX_OVERLAP: f64 = 0.8;
 
-/// A box that is left out because another box of its image shows the same.
+/// A box that is left out, because it repeats another box of its image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RepeatedBox {
     /// Its position in the image, from 1.
@@ -296,9 +296,9 @@ pub(crate) struct RepeatedBox {
     overlap: f64,
 }
 
-/// Removes the boxes of an image that show what another one shows, since each would be an object of its own: boxes of one
-/// class that overlap almost completely, from a detector without suppression or a table that was appended twice. The one
-/// with the highest score is kept, of equal ones the first.
+/// Removes boxes of one class that overlap almost completely, since each would be an object of its own. They come from
+/// detectors without suppression, and from tables that were appended twice. The box with the highest score is kept, and of
+/// equal ones the first.
 pub(crate) fn remove_repeated(boxes: &mut Vec<Detection>) -> Vec<RepeatedBox> {
     let score = |place: &usize| boxes[*place].scores.best().map_or(0.0, |(_, score)| score);
     let mut order: Vec<usize> = (0..boxes.len()).collect();
