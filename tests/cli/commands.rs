@@ -1,5 +1,4 @@
 //! Each command: its arguments and its results.
-mod bundle;
 mod check;
 mod documents;
 pub(crate) mod experiment;

@@ -2,6 +2,7 @@
 use crate::root;
 
 mod book;
+mod bundles;
 mod help;
 mod kinds;
 mod least_squares;

@@ -1,4 +1,5 @@
-//! Models of COLMAP: the example is solved, written and read again.
+//! `docs/bundles.md`: its document is solved, and the model of the example is solved, written and read again.
+use super::block;
 use crate::{folder, manifactor, path, root};
 use std::fs;
 
@@ -55,4 +56,16 @@ fn folders_that_are_no_text_model_are_refused() {
     let refused = |name: &str| manifactor(&format!("solve {}", path(&folder, name)));
     refused("binary").ended(2).complains("--output_type TXT");
     refused("short").ended(3).complains("cameras.txt");
+}
+
+#[test]
+fn a_document_estimates_the_focal_length_of_one_observation() {
+    let document = block("bundles.md", "toml", "uncalibrated_radial");
+    let folder = folder(&[("camera.toml", &document)]);
+    let json = manifactor(&format!("solve {} --json", path(&folder, "camera.toml"))).ended(0).json();
+    // the point is at (0.1, -0.05) on the plane at depth one, and its pixel 70 right of the centre and 35 above it
+    let camera = &json["values"]["camera"];
+    let k = camera["distortion"][0].as_f64().unwrap();
+    let radial = 1.0 + 0.0125 * k;
+    assert!((camera["f"].as_f64().unwrap() * radial - 700.0).abs() < 1e-3, "{camera}");
 }
