@@ -108,7 +108,7 @@ fn mistakes_of_a_recording_are_named() {
 #[test]
 fn an_error_of_a_part_and_unused_images_are_said_to_be_so() {
     let [imu, tracks, truth, document] = files();
-    let part = truth.lines().take(20).map(|line| format!("{line}\n")).collect::<String>();
+    let part = truth.lines().take(100).map(|line| format!("{line}\n")).collect::<String>();
     // the header and the first readings, up to after the first image
     let later: String =
         imu.lines().take(1).chain(imu.lines().skip(30)).map(|line| format!("{line}\n")).collect();
