@@ -200,7 +200,10 @@ fn initial_values_are_those_before_the_solve() {
     let [initial, estimate] = error("with", "");
     let [without, _] = error("without", "--set completion.enabled=false");
     // the second stage can map more objects
-    assert!((initial / without - 1.0).abs() < 0.2 && initial > 1.5 * estimate, "{initial} {estimate} {without}");
+    assert!(
+        (initial / without - 1.0).abs() < 0.2 && initial > 1.5 * estimate,
+        "{initial} {estimate} {without}"
+    );
 }
 
 #[test]
