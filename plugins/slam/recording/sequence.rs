@@ -283,7 +283,7 @@ pub struct Detection {
 /// Two boxes of one class with a larger overlap (intersection over union) show one object: detectors that suppress such
 /// boxes do so from 0.45 to 0.7. In the boxes of freiburg1/desk, desk2, freiburg2/desk and freiburg3 (35,703 boxes of a
 /// detector with a limit of 0.5) no two boxes of one class overlap by more than 0.5.
-const MAX_OVERLAP: f64 = 0.8;
+const MAX_OVERLAP: f64 = 0.7;
 
 /// A box that is left out, because it repeats another box of its image.
 #[derive(Debug, Clone, Copy, PartialEq)]
