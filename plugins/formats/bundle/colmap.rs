@@ -22,6 +22,7 @@ use crate::error::FormatError;
 use crate::graph_format::{GraphFormat, GraphText};
 use crate::lines::lines;
 use manifactor_graph::{Graph, Values};
+use std::io;
 use std::path::Path;
 
 mod build;
@@ -69,5 +70,11 @@ fn format(graph: &Graph, values: &Values, like: Option<&Path>) -> Result<GraphTe
         Some(folder) => Model::read(folder)?.with_values(values),
         None => Model::of_graph(graph, values),
     };
+    if model.images.is_empty() {
+        let fault = "no factor of type `uncalibrated_pinhole`, `uncalibrated_radial`, `uncalibrated_radial_tangential` or \
+                     `uncalibrated_kannala_brandt`, so the graph is no model of COLMAP: write it as .json or .toml";
+        let (path, source) = ("graph".into(), io::Error::new(io::ErrorKind::Unsupported, fault));
+        return Err(FormatError::Io { path, source });
+    }
     Ok(GraphText { files: model.texts().map(|(name, text)| (Some(name), text)).into(), notes })
 }

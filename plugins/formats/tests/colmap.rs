@@ -2,7 +2,7 @@
 use manifactor_formats::colmap::{Camera, Image, ImagePoint, Lens, Model, Point};
 use manifactor_formats::{FormatError, GraphFormat, GraphRead, InformationRepair, ReadOptions};
 use manifactor_geometry::{CameraModel, Coordinates, Intrinsics, Radial, Se3, So3, UncalibratedModel};
-use manifactor_graph::{Fixed, Key};
+use manifactor_graph::{Fixed, Graph, Key, Values};
 use manifactor_solve::{Auto, GaussNewton, Optimizer, Silent, solve};
 use nalgebra::{Vector2, Vector3, Vector5};
 use std::fs;
@@ -166,6 +166,13 @@ fn a_graph_is_a_model_without_the_folder_it_came_from() {
     assert_eq!(back.images[1].name, "image11");
     let again = back.graph(true);
     assert!((again.graph.cost(&again.values).unwrap() - graph.cost(&values).unwrap()).abs() < 1e-9);
+}
+
+#[test]
+fn a_graph_without_such_cameras_is_no_model() {
+    let format = GraphFormat::of_destination(Path::new("out")).unwrap();
+    let error = format.format.unwrap()(&Graph::new(), &Values::new(), None).unwrap_err().to_string();
+    assert!(error.contains("so the graph is no model of COLMAP"), "{error}");
 }
 
 #[test]
