@@ -145,17 +145,23 @@ fn free_motions(
 ) -> (Vec<(Motion, Vec<f64>)>, Vec<Motion>) {
     let (mut free, mut possible): (Vec<(Motion, Vec<f64>)>, _) = (vec![], vec![]);
     for motion in Motion::ALL {
-        let (mut v, mut moving) = (vec![0.0; scale.len()], 0);
+        let (mut v, mut moving, mut is_anchored) = (vec![0.0; scale.len()], 0, false);
         for place in &model.variables {
-            let value = place.start.and_then(|_| model.columns().column(place.column).get(place.index));
-            if let (Some(start), Some(moved)) = (place.start, value.and_then(|x| x.erased().moved(motion))) {
-                moving += usize::from(moved.iter().any(|x| *x != 0.0));
-                v[start..start + moved.len()].copy_from_slice(&moved);
+            let value = model.columns().column(place.column).get(place.index);
+            let moved = value.and_then(|x| x.erased().moved(motion)).unwrap_or_default();
+            if moved.iter().all(|x| *x == 0.0) {
+                continue;
             }
+            match place.start {
+                Some(start) => v[start..start + moved.len()].copy_from_slice(&moved),
+                // beside a fixed variable, the whole cannot move
+                None => is_anchored = true,
+            }
+            moving += 1;
         }
         let length = product(&v, &v, scale).sqrt();
         // a single variable is named itself
-        if moving < 2 || !(length > 0.0 && length.is_finite()) {
+        if moving < 2 || is_anchored || !(length > 0.0 && length.is_finite()) {
             continue;
         }
         possible.push(motion);
