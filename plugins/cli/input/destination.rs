@@ -68,6 +68,12 @@ impl Destination {
             (None, Some(writer)) => writer(graph, values, Some(input))?,
             (None, None) => return Err(no_format(path)),
         };
+        // the main file of a folder was looked for before the solve
+        let mut others = written.at(path).filter(|(file, _)| file != path);
+        if let Some((file, _)) = others.find(|(file, _)| !self.force && file.exists()) {
+            let what = format!("{} exists already", file.display());
+            return Err(Failure::with_help(what, "choose another folder, or overwrite it with --force"));
+        }
         for (file, text) in written.at(path) {
             if file != *path {
                 std::fs::create_dir_all(path).map_err(Failure::at(path))?;

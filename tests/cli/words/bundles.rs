@@ -26,6 +26,10 @@ fn the_model_of_the_example_is_solved_and_written() {
     // the files of a model are not replaced
     manifactor(&format!("solve examples/bundle --out {out}")).ended(2).complains("has a model already");
     manifactor(&format!("solve examples/bundle --out {out} --force")).ended(0);
+    fs::remove_file(format!("{out}/images.txt")).unwrap();
+    manifactor(&format!("solve examples/bundle --out {out}"))
+        .ended(2)
+        .complains("cameras.txt exists already");
 }
 
 #[test]
