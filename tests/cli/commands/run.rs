@@ -282,3 +282,17 @@ fn frames_out_of_order_are_left_out_and_images_of_one_time_are_one_frame() {
         times.map(|line| line.split_whitespace().next().unwrap().parse().unwrap()).collect();
     assert_eq!(times, [0.0, 0.1, 0.3, 0.4]);
 }
+
+#[test]
+fn a_fit_that_takes_many_iterations_maps_its_object() {
+    let folder = folder(&[]);
+    let seeds = "--set source.seed=1 --set source.scene.seed=1 --set source.trajectory.seed=1";
+    let out = path(&folder, "out");
+    let json = manifactor(&format!("run examples/figures/short_arc.toml --out {out} {seeds} --json")).json();
+    let variants = json["variants"].as_array().unwrap();
+    assert!(
+        variants.iter().all(|variant| variant["counts"]["objects"] == 9),
+        "{}",
+        json["variants"][0]["counts"]
+    );
+}
