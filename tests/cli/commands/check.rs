@@ -49,13 +49,14 @@ fn a_point_that_is_seen_from_one_place_is_told() {
     }
     text += "[[variables]]\nkey = \"l0\"\nvalue = { type = \"point3\", position = [0.0, 0.0, 4.0] }\n";
     check("point.toml", &text).ended(0).complains("at these values, nothing constrains l0.z");
-    // two such points do not move as a whole, because the poses are fixed
+    // two such points do not move as a whole, because the poses are fixed; but the scale about them is free
     let second = text.replace("[\"x0\", \"l0\"]", "[\"x0\", \"l1\"]").replace("key = \"l0\"", "key = \"l1\"");
     let second = &second[second.find("[[factors]]").unwrap()..];
     let second = second.split("[[variables]]\nkey = \"x1\"").next().unwrap().to_owned()
         + "[[variables]]\nkey = \"l1\"\nvalue = { type = \"point3\", position = [0.0, 0.0, 4.0] }\n";
     let both = check("points.toml", &(text + &second)).ended(0);
-    both.complains("nothing constrains l");
+    both.complains("l0.z by 1.00");
+    assert!(!both.stderr.contains("position"), "{}", both.stderr);
 }
 
 #[test]
