@@ -38,6 +38,14 @@ def test_the_example_of_a_page_runs(page: str) -> None:
     assert space["solution"].converged  # type: ignore[attr-defined]
 
 
+def test_the_model_of_bundles_is_solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (block,) = blocks_of("docs/bundles.md")
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block, "docs/bundles.md", "exec"), {})  # noqa: S102
+    assert (tmp_path / "refined/images.txt").exists()
+
+
 def test_the_factors_of_wheels_and_gnss_fit_their_types() -> None:
     (block,) = blocks_of("docs/visual-inertial.md")
     space: dict[str, object] = {}
