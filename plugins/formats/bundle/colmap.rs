@@ -21,6 +21,7 @@
 use crate::error::FormatError;
 use crate::graph_format::{GraphFormat, GraphText};
 use crate::lines::lines;
+use crate::text::read_text;
 use manifactor_graph::{Graph, Values};
 use std::io;
 use std::path::Path;
@@ -55,7 +56,7 @@ crate::register_graph_format!(GraphFormat {
 
 /// Returns a note if the model has cameras that are mounted together.
 fn rig_note(folder: &Path) -> Option<String> {
-    let rigs = std::fs::read_to_string(folder.join("rigs.txt")).ok()?;
+    let rigs = read_text(&folder.join("rigs.txt")).ok()?;
     let sensors = |line: &str| line.split_whitespace().nth(1).and_then(|n| n.parse::<u32>().ok());
     let has_rig = lines(&rigs).any(|(_, line)| sensors(line).is_some_and(|n| n > 1));
     let note = "rigs.txt: cameras that are mounted together keep no common pose: each image has its own";
@@ -65,6 +66,8 @@ fn rig_note(folder: &Path) -> Option<String> {
 /// Returns the model of a graph as texts. Names of images and colours come from the model in the folder `like`, if there is
 /// one.
 fn format(graph: &Graph, values: &Values, like: Option<&Path>) -> Result<GraphText, FormatError> {
+    // the model may have been read by its folder or by its file
+    let like = like.and_then(|path| if path.is_file() { path.parent() } else { Some(path) });
     let like = like.filter(|folder| folder.join(IMAGES).is_file());
     let (model, notes) = match like {
         Some(folder) => Model::read(folder)?.with_values(values),

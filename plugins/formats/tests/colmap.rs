@@ -169,6 +169,22 @@ fn a_graph_is_a_model_without_the_folder_it_came_from() {
 }
 
 #[test]
+fn a_camera_that_its_model_cannot_express_gets_another_model() {
+    let folder = written(&model(0.0));
+    let GraphRead { graph, mut values, .. } = Model::read(folder.path()).unwrap().graph(true);
+    let lens = Radial::new([700.0, 320.0, 240.0, -0.05, 0.02], 640, 480).unwrap();
+    values.insert("camera3", Intrinsics(lens));
+    let format = GraphFormat::of_destination(Path::new("out")).unwrap().format.unwrap();
+    // the model is found by its folder and by its file
+    for like in [folder.path().to_owned(), folder.path().join("images.txt")] {
+        let text = format(&graph, &values, Some(&like)).unwrap();
+        let cameras = &text.files[0].1;
+        assert!(cameras.contains("3 RADIAL 640 480 700.0 320.0 240.0 -0.05 0.02"), "{cameras}");
+        assert!(text.files[1].1.contains("a folder/image #0.jpg"));
+    }
+}
+
+#[test]
 fn a_graph_without_such_cameras_is_no_model() {
     let format = GraphFormat::of_destination(Path::new("out")).unwrap();
     let error = format.format.unwrap()(&Graph::new(), &Values::new(), None).unwrap_err().to_string();

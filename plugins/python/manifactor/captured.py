@@ -35,8 +35,8 @@ class Same:
 def captured(function: Callable[..., Any]) -> tuple[Any, ...]:
     """Returns the numbers, arrays and values that a function uses besides its arguments, to notice a change.
 
-    The functions that it calls count too, but not those of installed packages. Of other objects, a change of the name
-    to another object counts; a change of their attributes does not."""
+    The functions that it calls count too, but not those of installed packages. A name that gets another
+    object counts; a change of the attributes of an object does not."""
     found: list[Any] = []
     waiting, seen = [function], {function}
     while waiting:

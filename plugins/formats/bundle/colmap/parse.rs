@@ -26,8 +26,8 @@ impl Model {
     /// Reads a model; `text` is that of `images.txt`, whose path is `path`. The other files are in the same folder.
     ///
     /// # Errors
-    /// If a file is missing, if a line is malformed, if a number occurs twice or names something that the model does not
-    /// have, or if images and points disagree about what sees what. The error lists all mistakes of one file.
+    /// If a file is missing, a line is malformed, a number occurs twice or refers to nothing in the model, or images and
+    /// points contradict each other. The error lists all mistakes of one file.
     pub fn parse(text: &str, path: &Path) -> Result<Self, FormatError> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let file = folder.join(CAMERAS);

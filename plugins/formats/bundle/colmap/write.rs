@@ -8,7 +8,7 @@ use manifactor_geometry::{
     UncalibratedModel, UncalibratedProjection,
 };
 use manifactor_graph::{FactorEntry, Graph, Key, Values, Variable};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Mean distance of points that COLMAP has not measured yet.
 const NO_ERROR: f64 = -1.0;
@@ -19,8 +19,14 @@ impl Model {
         let mut kept = 0;
         for camera in &mut self.cameras {
             match values.variable(camera_key(camera.id).as_str()).and_then(lens_of) {
-                // a model without distortion has no place for one
-                Some(lens) => camera.lens = lens,
+                Some(lens) => {
+                    // the model of the file, unless it cannot express the estimate
+                    let same = Lens::new(camera.model.name(), lens.size(), &lens.parameters(camera.model));
+                    if !same.is_ok_and(|(same, _)| same == lens) {
+                        camera.model = lens.model();
+                    }
+                    camera.lens = lens;
+                }
                 None => kept += 1,
             }
         }
@@ -97,7 +103,7 @@ impl Model {
                 image.name = format!("{}_{before}", image.name);
             }
         }
-        let used: Vec<u64> = model.images.iter().map(|image| image.camera).collect();
+        let used: HashSet<u64> = model.images.iter().map(|image| image.camera).collect();
         model.cameras.retain(|camera| used.contains(&camera.id));
         model.measure();
         let mut notes = omission_notes("COLMAP", &variables, &factors);

@@ -43,11 +43,10 @@ impl ConsistencyReport {
             normalized(&DVector::from_column_slice(error.as_slice()), covariance.clone())
         });
         let within = *settings.max_time_difference;
-        let truth_from_map =
-            truth_from_map(estimate, &estimate.trajectory(), within).unwrap_or(Se3::identity());
+        let truth_from_map = truth_from_map(estimate, &estimate.trajectory(), within);
         let landmarks = estimate.landmarks();
         let objects = landmarks.iter().filter_map(|landmark| {
-            let pose: Se3 = truth_from_map.compose(&landmark.quadric.pose);
+            let pose: Se3 = truth_from_map?.compose(&landmark.quadric.pose);
             let off = landmark.truth?.bounding_box.centroid() - pose.translation;
             // the tangent of a pose rotates with the pose, so the translation is in the object's frame
             let off = pose.rotation.inverse().act(&off);
