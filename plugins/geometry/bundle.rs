@@ -2,6 +2,7 @@
 mod bal_camera;
 mod camera;
 pub(crate) mod camera_model;
+mod camera_view;
 mod intrinsics;
 mod inverse_depth;
 mod projection;
@@ -15,6 +16,7 @@ mod wide;
 pub use bal_camera::BalCamera;
 pub use camera::{Camera, CameraError};
 pub use camera_model::{AnyCamera, CameraModel, UncalibratedModel};
+pub use camera_view::CameraView;
 pub use intrinsics::{Intrinsics, IntrinsicsOver};
 pub use inverse_depth::InverseDepthProjection;
 pub use projection::Projection;

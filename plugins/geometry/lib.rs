@@ -7,7 +7,7 @@
 pub mod __private {
     pub use crate::bundle::camera_model::{CameraNames, UncalibratedName, rectify};
     pub use manifactor_graph;
-    pub use nalgebra::Vector2;
+    pub use nalgebra::{Vector2, Vector3};
 }
 
 mod bundle;
@@ -21,9 +21,9 @@ mod procrustes;
 pub mod testing;
 
 pub use bundle::{
-    AnyCamera, BalCamera, Camera, CameraError, CameraModel, Distortion, DistortionError, DoubleSphere,
-    ExtendedUnified, Intrinsics, IntrinsicsOver, InverseDepthProjection, KannalaBrandt, Projection,
-    ProjectionBal, Radial, RadialTangential, Stereo, UncalibratedModel, UncalibratedProjection,
+    AnyCamera, BalCamera, Camera, CameraError, CameraModel, CameraView, Distortion, DistortionError,
+    DoubleSphere, ExtendedUnified, Intrinsics, IntrinsicsOver, InverseDepthProjection, KannalaBrandt,
+    Projection, ProjectionBal, Radial, RadialTangential, Stereo, UncalibratedModel, UncalibratedProjection,
 };
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{

@@ -1,6 +1,6 @@
 //! Interface of camera models: a model is one file that implements [`CameraModel`] and ends with
 //! `register_camera!`.
-use crate::{Camera, Point3};
+use crate::{Camera, CameraView, Point3};
 use manifactor_graph::{Block, Dimension, Jet, JetOf, Lift, Manifold, Matrix, Scalar, Vector};
 use nalgebra::{Matrix2x3, U2, U3, Vector2, Vector3};
 use schemars::JsonSchema;
@@ -98,6 +98,12 @@ pub trait AnyCamera: Debug + Send + Sync {
 
     /// Maps a pixel of the original image to the rectified image; `None` if there is no such pixel.
     fn rectify(&self, pixel: &Vector2<f64>) -> Option<Vector2<f64>>;
+
+    /// Returns the direction of a pixel in the frame of the camera, of any length; `None` if the model has none.
+    fn ray(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>>;
+
+    /// Returns the pinhole camera that agrees with this camera around a pixel; `None` if the pixel has no direction.
+    fn view(&self, pixel: &Vector2<f64>) -> Option<CameraView>;
 }
 
 manifactor_graph::kind!(dyn AnyCamera, "camera");
@@ -125,8 +131,12 @@ const MIN_COSINE: f64 = 0.342;
 /// Maps a pixel of a camera to the rectified image; `None` for a direction more than 70° from the optical axis.
 #[doc(hidden)]
 pub fn rectify<M: CameraModel>(camera: &M, pixel: &Vector2<f64>) -> Option<Vector2<f64>> {
-    let direction = camera.unproject(pixel)?;
-    (direction.z > MIN_COSINE * direction.norm()).then(|| camera.pinhole().project(&direction))
+    project_ahead(&camera.pinhole(), &camera.unproject(pixel)?)
+}
+
+/// Returns the pixel of a direction; `None` beyond 70° from the optical axis.
+pub(super) fn project_ahead(camera: &Camera, direction: &Vector3<f64>) -> Option<Vector2<f64>> {
+    (direction.z > MIN_COSINE * direction.norm()).then(|| camera.project(direction))
 }
 
 /// Defines the document of a camera: the numbers of its pinhole camera without skew, then those of its lens.
@@ -200,6 +210,18 @@ macro_rules! register_camera {
                     pixel: &$crate::__private::Vector2<f64>,
                 ) -> ::std::option::Option<$crate::__private::Vector2<f64>> {
                     $crate::__private::rectify(self, pixel)
+                }
+                fn ray(
+                    &self,
+                    pixel: &$crate::__private::Vector2<f64>,
+                ) -> ::std::option::Option<$crate::__private::Vector3<f64>> {
+                    $crate::CameraModel::unproject(self, pixel)
+                }
+                fn view(
+                    &self,
+                    pixel: &$crate::__private::Vector2<f64>,
+                ) -> ::std::option::Option<$crate::CameraView> {
+                    $crate::CameraView::new(self, pixel)
                 }
             }
             $crate::__private::manifactor_graph::register!(dyn $crate::AnyCamera, $name, $type);

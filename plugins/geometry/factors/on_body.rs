@@ -120,9 +120,12 @@ impl OnBody {
         Ok(Self { document: Document { factor, body_from_camera, poses }, compiled })
     }
 
-    /// Returns the factor that an `on_body` factor contains, or the factor itself if it is of another type.
-    pub fn unwrapped(factor: &dyn Factor) -> &dyn Factor {
-        Self::content(factor).map_or(factor, |(inner, _)| &**inner)
+    /// Returns the innermost factor of an `on_body` factor, or the factor itself if it is of another type.
+    pub fn unwrapped(mut factor: &dyn Factor) -> &dyn Factor {
+        while let Some((inner, _)) = Self::content(factor) {
+            factor = &**inner;
+        }
+        factor
     }
 
     /// Returns the factor that an `on_body` factor contains, with the pose of the camera on the body if it is constant.

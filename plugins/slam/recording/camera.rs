@@ -1,10 +1,11 @@
 //! The cameras of a sequence.
-use manifactor_geometry::{OnBody, OnBodyError, Se3};
+use manifactor_geometry::{CameraView, OnBody, OnBodyError, Se3, So3};
 use manifactor_graph::Factor;
 use manifactor_quadric::Camera;
+use nalgebra::Vector3;
 use std::sync::Arc;
 
-/// A camera of a sequence.
+/// A camera of a sequence, or the view of a wide lens around one box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MountedCamera {
     /// Name in the document; empty for the first camera.
@@ -13,8 +14,10 @@ pub struct MountedCamera {
     pub index: usize,
     /// The camera model.
     pub model: Camera,
-    /// Pose in the frame of the first camera; `None` for the first camera itself.
+    /// Pose of the lens in the frame of the first camera; `None` for the first camera itself.
     pub first_from_camera: Option<Se3>,
+    /// Rotation of a view, in the frame of its lens; `None` for the camera itself.
+    pub lens_from_view: Option<So3>,
 }
 
 impl MountedCamera {
@@ -26,9 +29,21 @@ impl MountedCamera {
         }
     }
 
-    /// Returns the pose of this camera from the pose of the first one.
+    /// Returns the view of this camera around a box.
+    pub(crate) fn viewed(&self, view: &CameraView) -> Self {
+        let CameraView { lens_from_view, camera } = *view;
+        Self { model: camera, lens_from_view: Some(lens_from_view), ..self.clone() }
+    }
+
+    /// Returns the view, if this is one.
+    pub(crate) fn view(&self) -> Option<CameraView> {
+        self.lens_from_view.map(|lens_from_view| CameraView { lens_from_view, camera: self.model })
+    }
+
+    /// Returns the pose of this camera, or of its view, from the pose of the first camera.
     pub fn pose(&self, world_from_first: &Se3) -> Se3 {
-        self.first_from_camera.map_or(*world_from_first, |pose| world_from_first.compose(&pose))
+        let lens = self.first_from_camera.map_or(*world_from_first, |pose| world_from_first.compose(&pose));
+        self.lens_from_view.map_or(lens, |view| lens.compose(&turn(view)))
     }
 
     /// Returns a factor on the pose of the first camera, from a factor whose first variable is the pose of this one.
@@ -36,11 +51,24 @@ impl MountedCamera {
     /// # Errors
     /// If the first variable is not a pose.
     pub fn on_first(&self, factor: Arc<dyn Factor>) -> Result<Arc<dyn Factor>, OnBodyError> {
+        let of_lens = match self.lens_from_view {
+            None => factor,
+            Some(view) => on_camera(factor, &turn(view))?,
+        };
         match self.first_from_camera {
-            None => Ok(factor),
-            Some(pose) => Ok(Arc::new(OnBody::new(factor, pose.inverse(), Some(vec![0]))?)),
+            None => Ok(of_lens),
+            Some(pose) => on_camera(of_lens, &pose),
         }
     }
+}
+
+/// Returns a factor whose first variable is a camera, from a factor on the pose of another camera in its frame.
+fn on_camera(factor: Arc<dyn Factor>, camera_from_other: &Se3) -> Result<Arc<dyn Factor>, OnBodyError> {
+    Ok(Arc::new(OnBody::new(factor, camera_from_other.inverse(), Some(vec![0]))?))
+}
+
+fn turn(rotation: So3) -> Se3 {
+    Se3::new(rotation, Vector3::zeros())
 }
 
 /// Returns whether the name of a further camera may have this character.
@@ -66,7 +94,13 @@ pub struct Cameras {
 impl Cameras {
     /// Creates the first camera.
     pub fn new(model: Camera) -> Self {
-        let first = MountedCamera { name: String::new(), index: 0, model, first_from_camera: None };
+        let first = MountedCamera {
+            name: String::new(),
+            index: 0,
+            model,
+            first_from_camera: None,
+            lens_from_view: None,
+        };
         Self { first: Arc::new(first), others: vec![] }
     }
 
@@ -79,7 +113,13 @@ impl Cameras {
             return Err(CameraNameError { name: name.to_owned() });
         }
         let (name, index) = (name.to_owned(), self.others.len() + 1);
-        let camera = MountedCamera { name, index, model, first_from_camera: Some(first_from_camera) };
+        let camera = MountedCamera {
+            name,
+            index,
+            model,
+            first_from_camera: Some(first_from_camera),
+            lens_from_view: None,
+        };
         self.others.push(Arc::new(camera));
         Ok(())
     }

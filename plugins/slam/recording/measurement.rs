@@ -55,6 +55,13 @@ pub trait Measurement: Debug + Send + Sync {
         None
     }
 
+    /// Returns the measurement in the frame of a camera at the same place that looks at the object, or `None` if there
+    /// is none. `cosine` is that of the angle between the two optical axes.
+    fn turned(&self, cosine: f64) -> Option<Arc<dyn Measurement>> {
+        let _ = cosine;
+        None
+    }
+
     /// Returns the residual of the [factor](Self::factor) and its derivatives; `None` if it is undefined.
     fn innovation(&self, pose: &Se3, object: &DualQuadric) -> Option<Innovation> {
         let factor = self.factor();
@@ -151,6 +158,15 @@ impl Quantities {
         self.iter().find_map(Measurement::depth)
     }
 
+    /// Converts the measurements to a camera at the same place that looks at the object. `cosine` is that of the angle
+    /// between the two optical axes.
+    ///
+    /// # Errors
+    /// The name of a measurement that cannot be converted.
+    pub(crate) fn turned(&self, cosine: f64) -> Result<Self, &'static str> {
+        self.iter().map(|measurement| measurement.turned(cosine).ok_or(measurement.name())).collect()
+    }
+
     /// Returns the factors between a frame and an object that `camera` sees. A measurement with invalid standard deviations is
     /// skipped and logged.
     pub fn entries<'a>(
@@ -205,6 +221,12 @@ impl Quantities {
             }
         }
         Ok(Self(measured))
+    }
+}
+
+impl FromIterator<Arc<dyn Measurement>> for Quantities {
+    fn from_iter<I: IntoIterator<Item = Arc<dyn Measurement>>>(measurements: I) -> Self {
+        Self(measurements.into_iter().collect())
     }
 }
 

@@ -262,13 +262,13 @@ pub enum SourceError {
     },
     /// A box that is impossible for the camera's lens.
     #[error(
-        "the box {bounds:?} of frame {frame} has no place in the rectified image: check the camera's numbers and its `distortion`"
+        "a box of frame {frame} cannot be used: {fault}; check the camera's numbers and its `distortion`"
     )]
     Distorted {
         /// Frame of the box.
         frame: usize,
-        /// Sides xmin, ymin, xmax, ymax. Unit: pixels.
-        bounds: [f64; 4],
+        /// The reason.
+        fault: String,
     },
     /// A further camera whose name cannot be used.
     #[error(transparent)]

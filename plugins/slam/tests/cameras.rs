@@ -1,6 +1,6 @@
 //! Several cameras on one body.
 use crate::online::{both, run_of};
-use manifactor_geometry::{Se3, So3};
+use manifactor_geometry::{Camera, CameraModel, KannalaBrandt, Se3, So3};
 use manifactor_quadric::DualQuadric;
 use manifactor_slam::camera::Cameras;
 use manifactor_slam::estimate::Estimate;
@@ -10,7 +10,7 @@ use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::{Detection, Sequence};
 use manifactor_solve::Silent;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
 
 /// A robot that drives a circle among objects, with a camera that looks ahead and down to the centre, and one that looks
@@ -100,4 +100,89 @@ fn a_wrong_pose_of_a_camera_is_reported() {
     let reported = warnings.iter().find(|warning| warning.contains("`rear`")).cloned();
     let reported = reported.unwrap_or_else(|| panic!("{warnings:?}"));
     assert!(reported.contains("`source.cameras.rear.body_from_camera`"), "{reported}");
+}
+
+/// Ellipsoids around a robot with a fisheye lens of 230° that looks ahead, the lines of its stream, and the boxes of each
+/// ellipsoid.
+fn fisheye_stream() -> (Vec<DualQuadric>, String, Vec<usize>) {
+    let lens = KannalaBrandt::new(Camera::new([200.0, 200.0, 400.0, 400.0], 800, 800).unwrap(), [0.0; 4]);
+    let object = |k: usize| {
+        let angle = std::f64::consts::TAU * k as f64 / 16.0;
+        let place = Vector3::new(0.6 + 2.0 * angle.cos(), 2.0 * angle.sin(), 0.4 * (3.0 * angle).sin());
+        let pose = Se3::new(So3::exp(&Vector3::new(0.3, 0.2, angle)), place);
+        DualQuadric { pose, semi_axes: Vector3::new(0.15, 0.1, 0.2) }
+    };
+    let objects: Vec<DualQuadric> = (0..16).map(object).collect();
+    // x right, y down, z ahead, which is x of the world
+    let ahead = So3::from_matrix(&Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0));
+    let (mut lines, mut boxes) = (String::new(), vec![0; objects.len()]);
+    for i in 0..40 {
+        let t = f64::from(i) / 40.0;
+        let turn =
+            ahead.compose(&So3::exp(&Vector3::new(0.05 * (9.0 * t).sin(), 0.2 * (5.0 * t).sin(), 0.0)));
+        let place = Vector3::new(1.2 * t, 0.4 * (4.0 * t).sin(), 0.3 * (6.0 * t).cos());
+        let pose = Se3::new(turn, place);
+        let seen: Vec<String> = objects
+            .iter()
+            .enumerate()
+            .filter_map(|(k, object)| {
+                let [xmin, ymin, xmax, ymax] = outline(&lens, &pose, object)?;
+                boxes[k] += 1;
+                Some(format!(r#"{{"box":[{xmin},{ymin},{xmax},{ymax}],"class":"cup","object":{k}}}"#))
+            })
+            .collect();
+        let pose = serde_json::to_string(&pose).unwrap();
+        lines += &format!("{{\"timestamp\":{t},\"pose\":{pose},\"boxes\":[{}]}}\n", seen.join(","));
+    }
+    (objects, lines, boxes)
+}
+
+/// Returns the box around an ellipsoid in the image of a lens; `None` if the border cuts it.
+fn outline(lens: &KannalaBrandt, pose: &Se3, object: &DualQuadric) -> Option<[f64; 4]> {
+    let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+    for i in 0..=90 {
+        for j in 0..180 {
+            let [tilt, turn] = [f64::from(i), f64::from(j)].map(|k| (2.0 * k).to_radians());
+            let ball = Vector3::new(tilt.sin() * turn.cos(), tilt.sin() * turn.sin(), tilt.cos());
+            let point = pose.inverse_act(&object.pose.act(&ball.component_mul(&object.semi_axes)));
+            let pixel = lens.sees(&point).then(|| lens.project(&point))?;
+            for axis in [0, 1] {
+                bounds[axis] = pixel[axis].min(bounds[axis]);
+                bounds[axis + 2] = pixel[axis].max(bounds[axis + 2]);
+            }
+        }
+    }
+    let is_inside = bounds.iter().all(|side| (25.0..775.0).contains(side));
+    is_inside.then_some(bounds)
+}
+
+#[test]
+fn a_fisheye_maps_what_is_beside_and_behind_it() {
+    let (objects, lines, boxes) = fisheye_stream();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("frames.jsonl"), lines).unwrap();
+    let file = folder.path().join("frames.jsonl");
+    let document = format!(
+        r#"
+detections = {{ noise = {{ sigma = 1.0 }} }}
+[source]
+type = "json_lines"
+file = "{}"
+camera = {{ type = "kannala_brandt", fx = 200.0, fy = 200.0, cx = 400.0, cy = 400.0, width = 800, height = 800, distortion = [0.0, 0.0, 0.0, 0.0] }}
+"#,
+        file.display()
+    );
+    let run = run_of(&document, &[]);
+    let (estimate, _) = estimate(&run, sequence_of(&run));
+    let landmarks = estimate.landmarks();
+    let often: Vec<usize> = (0..objects.len()).filter(|k| boxes[*k] >= 10).collect();
+    assert!(often.len() >= 9, "{boxes:?}");
+    // 100° from the axis
+    assert!(often.iter().any(|k| objects[*k].centroid().x < 0.2), "{boxes:?}");
+    for k in often {
+        let found = landmarks.iter().find(|landmark| landmark.object.id.0 == k as u32);
+        let found = found.unwrap_or_else(|| panic!("object {k} of {boxes:?} is missing"));
+        let error = (found.quadric.centroid() - objects[k].centroid()).norm();
+        assert!(error < 0.02, "object {k}: {error} m");
+    }
 }

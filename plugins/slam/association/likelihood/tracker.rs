@@ -168,11 +168,17 @@ impl Tracker {
         boxes: &[usize],
         pose: &Se3,
     ) -> (Vec<(usize, usize, f64)>, Vec<usize>) {
-        let Some(camera) = boxes.first().map(|i| &image.detections[*i].camera) else {
-            return Default::default();
+        let camera = |i: &usize| &*image.detections[*i].camera;
+        let mut rows = 0..boxes.len();
+        // one group, unless a wide lens has a view around each box
+        let view = |own: &[usize]| {
+            let pose = camera(&own[0]).pose(pose);
+            let usual = self.usual_depth(&pose);
+            let own: Vec<(usize, &Detection)> =
+                own.iter().map(|i| (rows.next().unwrap_or_default(), &image.detections[*i])).collect();
+            (pose, usual, own)
         };
-        let pose = &camera.pose(pose);
-        let usual = self.usual_depth(pose);
+        let views: Vec<_> = boxes.chunk_by(|a, b| camera(a) == camera(b)).map(view).collect();
         let classes: Vec<Option<String>> =
             boxes.iter().map(|i| self.best_class(&image.detections[*i])).collect();
         let began = self.start_time.unwrap_or(image.timestamp - PRIOR_OBJECT_AGE_S);
@@ -180,20 +186,24 @@ impl Tracker {
         for (t, track) in self.tracks.iter().enumerate() {
             let since = track.last_seen_s.unwrap_or(began);
             let unseen = (image.timestamp - since).max(0.0);
-            let Some(expected) = track.expected_box(unseen, pose, &camera.model, &self.settings) else {
-                continue;
-            };
             let before = gains.len();
-            for (row, i) in boxes.iter().enumerate() {
-                let detection = &image.detections[*i];
-                if !detection.bounding_box.intersects(expected.bounding_box()) {
+            for (pose, usual, own) in &views {
+                let Some(camera) = own.first().map(|(_, detection)| &detection.camera.model) else {
                     continue;
-                }
-                let new = self.settings.cost_of_new(&camera.model, &detection.quantities, usual);
-                let cost = expected.cost(&detection.bounding_box, &detection.quantities)
-                    - 2.0 * self.class_likelihood(track, classes[row].as_deref()).ln();
-                if cost < new {
-                    gains.push((row, tracks.len(), new - cost));
+                };
+                let Some(expected) = track.expected_box(unseen, pose, camera, &self.settings) else {
+                    continue;
+                };
+                for (row, detection) in own {
+                    if !detection.bounding_box.intersects(expected.bounding_box()) {
+                        continue;
+                    }
+                    let new = self.settings.cost_of_new(camera, &detection.quantities, *usual);
+                    let cost = expected.cost(&detection.bounding_box, &detection.quantities)
+                        - 2.0 * self.class_likelihood(track, classes[*row].as_deref()).ln();
+                    if cost < new {
+                        gains.push((*row, tracks.len(), new - cost));
+                    }
                 }
             }
             if gains.len() > before {

@@ -45,6 +45,10 @@ impl Measurement for DepthMeasurement {
         Some(self.0.get())
     }
 
+    fn turned(&self, cosine: f64) -> Option<Arc<dyn Measurement>> {
+        Some(Arc::new(Self(Positive::new(self.0.get() / cosine).ok()?)))
+    }
+
     // avoids allocations: data association calls it for every pair of a box and an object
     fn innovation(&self, pose: &Se3, object: &DualQuadric) -> Option<Innovation> {
         let mut jacobians = (SMatrix::zeros(), SMatrix::zeros());

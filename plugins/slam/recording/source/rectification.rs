@@ -1,7 +1,7 @@
-//! Rectification of boxes to a pinhole camera of equal focal lengths.
+//! Rectification of boxes to pinhole cameras.
 //!
 //! The outline of an ellipsoid is a conic only for a pinhole camera. All code after a source therefore uses
-//! the rectified image, and camera models appear only in this module.
+//! pinhole cameras: that of the rectified image or, for a wide lens, one for each box.
 use super::{CameraChoice, SourceError};
 use crate::sequence::Detection;
 use manifactor_geometry::{AnyCamera, Distortion, RadialTangential};
@@ -10,14 +10,19 @@ use nalgebra::Vector2;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Mapping from the images of a camera to the images of its pinhole camera.
+/// Mapping from the images of a camera to pinhole cameras.
 #[derive(Debug)]
 pub(super) struct Rectification {
-    /// The pinhole camera.
+    /// The pinhole camera of the rectified image.
     pub(super) camera: Camera,
     /// Model of the images; `None` if they come from the pinhole camera itself.
     model: Option<Arc<dyn AnyCamera>>,
+    /// Whether each box has a pinhole camera of its own.
+    is_wide: bool,
 }
+
+/// Largest stretch of a pixel in the rectified image, and of the noise of a box with it. Beyond it, a lens is wide.
+const MAX_STRETCH: f64 = 1.5;
 
 impl Rectification {
     /// Creates the rectification for a source's camera, with an optional distortion of its lens. A calibration file is
@@ -39,36 +44,72 @@ impl Rectification {
 
     /// Creates the rectification for a camera model.
     pub(super) fn of_model(model: Arc<dyn AnyCamera>) -> Self {
-        Self { camera: model.pinhole(), model: Some(model) }
+        Self { camera: model.pinhole(), is_wide: is_wide(&*model), model: Some(model) }
     }
 
     /// Creates the rectification for a pinhole camera, with an optional distortion of its lens.
     pub(super) fn of_pinhole(camera: Camera, distortion: Option<Distortion>) -> Self {
-        let model = distortion.map(|distortion| {
-            let model: Arc<dyn AnyCamera> = Arc::new(RadialTangential::new(camera, distortion));
-            model
-        });
-        Self { camera, model }
+        match distortion {
+            Some(distortion) => Self::of_model(Arc::new(RadialTangential::new(camera, distortion))),
+            None => Self { camera, model: None, is_wide: false },
+        }
     }
 
-    /// Rectifies the box and the ellipse of a detection. Returns `None`, and leaves them unchanged, if they have no place in
-    /// the rectified image.
-    pub(super) fn rectify(&self, detection: &mut Detection) -> Option<()> {
-        if let Some(model) = &self.model {
-            let bounding_box = rectified(&**model, &detection.bounding_box)?;
-            if let Some(ellipse) = &mut detection.ellipse {
-                *ellipse = ellipse.mapped(|point| model.rectify(point))?;
-            }
-            detection.bounding_box = bounding_box;
+    /// Rectifies the box and the ellipse of a detection. For a wide lens, its camera becomes the view around the box.
+    ///
+    /// # Errors
+    /// If there is no such box, or a measurement has no place in the view. The detection is then unchanged.
+    pub(super) fn rectify(&self, detection: &mut Detection) -> Result<(), String> {
+        let Some(model) = self.model.as_ref().filter(|_| detection.camera.view().is_none()) else {
+            return Ok(());
+        };
+        let seen = detection.bounding_box;
+        let fault = || format!("{:?} has no place in the rectified image of the camera", seen.bounds());
+        let view = match self.is_wide {
+            true => Some(model.view(&seen.centre()).ok_or_else(fault)?),
+            false => None,
+        };
+        let map = |pixel: &Vector2<f64>| match &view {
+            Some(view) => view.project(&model.ray(pixel)?),
+            None => model.rectify(pixel),
+        };
+        let bounding_box = rectified(map, &seen).ok_or_else(fault)?;
+        let ellipse = match detection.ellipse {
+            Some(ellipse) => Some(ellipse.mapped(map).ok_or_else(fault)?),
+            None => None,
+        };
+        if let Some(view) = &view {
+            let cosine = view.lens_from_view.matrix()[(2, 2)];
+            detection.quantities = detection
+                .quantities
+                .turned(cosine)
+                .map_err(|name| format!("`{name}` cannot be measured in this direction"))?;
+            detection.camera = Arc::new(detection.camera.viewed(view));
         }
-        Some(())
+        (detection.bounding_box, detection.ellipse) = (bounding_box, ellipse);
+        Ok(())
     }
 }
 
+/// Returns whether the rectified image stretches a pixel at the border of the image too much, or does not have it.
+fn is_wide(model: &dyn AnyCamera) -> bool {
+    let [width, height] = model.pinhole().size().into();
+    let border = [0.0, 0.5, 1.0].map(|x| [0.0, 0.5, 1.0].map(|y| Vector2::new(x * width, y * height)));
+    let stretch = |pixel: &Vector2<f64>| {
+        let from = model.rectify(pixel)?;
+        let steps = [Vector2::x(), Vector2::y()].map(|step| {
+            let near = model.rectify(&(pixel - step)).or_else(|| model.rectify(&(pixel + step)));
+            near.map(|near| (near - from).norm())
+        });
+        Some(steps[0]?.max(steps[1]?))
+    };
+    border.iter().flatten().any(|pixel| stretch(pixel).is_none_or(|stretch| stretch > MAX_STRETCH))
+}
+
 /// Rectifies a box by the midpoints of its sides, where an upright or lying ellipse touches them.
-fn rectified(model: &dyn AnyCamera, seen: &BoundingBox) -> Option<BoundingBox> {
-    let [x, y] = [0.5 * (seen.xmin + seen.xmax), 0.5 * (seen.ymin + seen.ymax)];
-    let side = |u, v, axis: usize| Some(model.rectify(&Vector2::new(u, v))?[axis]);
+fn rectified(map: impl Fn(&Vector2<f64>) -> Option<Vector2<f64>>, seen: &BoundingBox) -> Option<BoundingBox> {
+    let [x, y] = seen.centre().into();
+    let side = |u, v, axis: usize| Some(map(&Vector2::new(u, v))?[axis]);
     let bounds =
         [side(seen.xmin, y, 0)?, side(x, seen.ymin, 1)?, side(seen.xmax, y, 0)?, side(x, seen.ymax, 1)?];
     BoundingBox::new(bounds).ok()
@@ -77,6 +118,12 @@ fn rectified(model: &dyn AnyCamera, seen: &BoundingBox) -> Option<BoundingBox> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Cameras;
+    use crate::measurement::{DepthMeasurement, Quantities};
+    use crate::sequence::ClassScores;
+    use manifactor_geometry::{CameraModel, KannalaBrandt, Se3};
+    use manifactor_graph::checked::Positive;
+    use nalgebra::Vector3;
 
     /// Returns the calibration of freiburg1, as the benchmark publishes it.
     fn freiburg1(distortion: [f64; 5]) -> Rectification {
@@ -91,7 +138,8 @@ mod tests {
         let moved = |bounds: [f64; 4]| {
             let lens = freiburg1(LENS);
             let model = lens.model.unwrap();
-            let free = rectified(&*model, &BoundingBox::new(bounds).unwrap()).unwrap().bounds();
+            let seen = BoundingBox::new(bounds).unwrap();
+            let free = rectified(|pixel| model.rectify(pixel), &seen).unwrap().bounds();
             free.iter().zip(bounds).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
         };
         assert!(moved([310.0, 245.0, 330.0, 265.0]) < 0.1);
@@ -108,7 +156,10 @@ mod tests {
         let named: CameraChoice = serde_json::from_value(numbers).unwrap();
         let seen = BoundingBox::new([20.0, 30.0, 120.0, 200.0]).unwrap();
         let model = Rectification::new(&named, None, Path::new("")).unwrap();
-        let of = |lens: &Rectification| rectified(&**lens.model.as_ref().unwrap(), &seen);
+        let of = |lens: &Rectification| {
+            let model = lens.model.clone().unwrap();
+            rectified(|pixel| model.rectify(pixel), &seen)
+        };
         assert_eq!(of(&model), of(&lens));
         assert_eq!(model.camera, lens.camera);
         assert!(matches!(
@@ -121,6 +172,62 @@ mod tests {
     fn a_lens_that_folds_the_image_leaves_no_box() {
         let folds = freiburg1([-9.0, 0.0, 0.0, 0.0, 0.0]);
         let seen = BoundingBox::new([20.0, 30.0, 120.0, 200.0]).unwrap();
-        assert_eq!(rectified(&*folds.model.unwrap(), &seen), None);
+        let model = folds.model.unwrap();
+        assert_eq!(rectified(|pixel| model.rectify(pixel), &seen), None);
+    }
+
+    /// Returns the boxes of a camera, all of one image.
+    fn seen_by(lens: &Rectification, bounds: [f64; 4], depth: Option<f64>) -> Detection {
+        let camera = Cameras::new(lens.camera).first().clone();
+        let mut seen =
+            Detection::new(camera, BoundingBox::new(bounds).unwrap(), ClassScores::single("cup", 0.9));
+        if let Some(depth) = depth {
+            seen.quantities = Quantities::one(DepthMeasurement(Positive::new(depth).unwrap()));
+        }
+        seen
+    }
+
+    #[test]
+    fn only_lenses_that_stretch_their_image_are_wide() {
+        assert!(!freiburg1(LENS).is_wide);
+        assert!(Rectification::of_model(Arc::new(fisheye())).is_wide);
+        let narrow =
+            Camera { width: 200, height: 200, cx: 100.0, cy: 100.0, ..CameraModel::pinhole(&fisheye()) };
+        assert!(!Rectification::of_model(Arc::new(KannalaBrandt::new(narrow, [0.0; 4]))).is_wide);
+    }
+
+    /// 180° over 800 pixels.
+    fn fisheye() -> KannalaBrandt {
+        let pinhole = Camera::new([254.6, 254.6, 400.0, 400.0], 800, 800).unwrap();
+        KannalaBrandt::new(pinhole, [0.0; 4])
+    }
+
+    #[test]
+    fn a_box_of_a_wide_lens_has_a_view_of_its_own() {
+        let lens = Rectification::of_model(Arc::new(fisheye()));
+        let bounds = [650.0, 380.0, 690.0, 420.0];
+        let mut seen = seen_by(&lens, bounds, Some(1.0));
+        lens.rectify(&mut seen).unwrap();
+        let moved = seen.bounding_box.bounds().into_iter().zip(bounds).map(|(a, b)| (a - b).abs());
+        assert!(moved.fold(0.0, f64::max) < 0.1, "{:?}", seen.bounding_box);
+        // 270 pixels from the middle
+        let angle = 270.0 / 254.6_f64;
+        let axis = seen.camera.pose(&Se3::identity()).rotation.act(&Vector3::z());
+        assert!((axis.x.atan2(axis.z) - angle).abs() < 1e-9, "{axis}");
+        assert!((seen.quantities.depth().unwrap() - 1.0 / angle.cos()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_depth_behind_a_wide_lens_is_refused() {
+        let backwards = Camera { fx: 200.0, fy: 200.0, ..CameraModel::pinhole(&fisheye()) };
+        let lens = Rectification::of_model(Arc::new(KannalaBrandt::new(backwards, [0.0; 4])));
+        let bounds = [740.0, 380.0, 780.0, 420.0];
+        let mut seen = seen_by(&lens, bounds, Some(1.0));
+        assert!(lens.rectify(&mut seen).unwrap_err().contains("`depth` cannot be measured"));
+        assert_eq!(seen.bounding_box.bounds(), bounds);
+        let mut seen = seen_by(&lens, bounds, None);
+        lens.rectify(&mut seen).unwrap();
+        let axis = seen.camera.pose(&Se3::identity()).rotation.act(&Vector3::z());
+        assert!(axis.z < 0.0, "{axis}");
     }
 }

@@ -61,8 +61,8 @@ impl Rig {
     /// If a box has no place in the rectified image.
     pub(super) fn apply(&self, detections: &mut [Detection]) -> Result<(), SourceError> {
         detections.iter_mut().try_for_each(|detection| {
-            let (frame, bounds) = (detection.frame, detection.bounding_box.bounds());
-            self.rectify(detection).ok_or(SourceError::Distorted { frame, bounds })
+            let frame = detection.frame;
+            self.rectify(detection).map_err(|fault| SourceError::Distorted { frame, fault })
         })
     }
 
@@ -73,17 +73,14 @@ impl Rig {
         let mut place = 0;
         detections.retain_mut(|detection| {
             place += 1;
-            let is_rectified = self.rectify(detection).is_some();
-            if !is_rectified {
-                let bounds = detection.bounding_box.bounds();
-                let fault = format!("{bounds:?} has no place in the rectified image of the camera");
-                unused.push(UnusedInput::Box { timestamp: frame.timestamp, place, fault });
-            }
-            is_rectified
+            let rectified = self.rectify(detection);
+            let report = |fault| unused.push(UnusedInput::Box { timestamp: frame.timestamp, place, fault });
+            rectified.map_err(report).is_ok()
         });
     }
 
-    fn rectify(&self, detection: &mut Detection) -> Option<()> {
-        self.lenses.get(detection.camera.index)?.rectify(detection)
+    fn rectify(&self, detection: &mut Detection) -> Result<(), String> {
+        let lens = self.lenses.get(detection.camera.index);
+        lens.ok_or_else(|| format!("unknown camera {}", detection.camera.index))?.rectify(detection)
     }
 }

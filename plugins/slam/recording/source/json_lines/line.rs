@@ -9,7 +9,7 @@ use crate::sequence::{
 };
 use indexmap::IndexMap;
 use manifactor_formats::tum::StampedPose;
-use manifactor_geometry::Se3;
+use manifactor_geometry::{CameraView, Se3};
 use manifactor_graph::checked::Share;
 use manifactor_graph::{Manifold, Noise};
 use manifactor_quadric::BoundingBox;
@@ -96,6 +96,9 @@ struct LineBox {
     /// Outline of the object in place of the box, for example from a mask. The box is still needed, for data association.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     ellipse: Option<ImageEllipse>,
+    /// Pinhole camera of the box, if it is given in the view of a wide lens. The program writes it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    view: Option<CameraView>,
     #[serde(flatten)]
     #[schemars(skip)]
     quantities: IndexMap<String, Value>,
@@ -110,7 +113,7 @@ fn add_measurements(schema: &mut Schema) {
 }
 
 /// Fields of a box besides its measurements.
-const FIELDS: [&str; 7] = ["box", "class", "score", "scores", "object", "camera", "ellipse"];
+const FIELDS: [&str; 8] = ["box", "class", "score", "scores", "object", "camera", "ellipse", "view"];
 
 /// A reading of the accelerometer.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
@@ -149,6 +152,7 @@ pub fn format_line(observation: &Observation) -> String {
             object: detection.object,
             camera: Some(detection.camera.name.clone()).filter(|_| detection.camera.index > 0),
             ellipse: detection.ellipse,
+            view: detection.camera.view(),
             quantities: detection.quantities.to_fields().collect(),
         }
     };
@@ -305,7 +309,8 @@ impl LineBox {
     }
 
     fn into_detection(self, cameras: &Cameras) -> Result<Detection, String> {
-        let camera = cameras.named(self.camera.as_deref())?.clone();
+        let named = cameras.named(self.camera.as_deref())?;
+        let camera = self.view.map_or_else(|| named.clone(), |view| Arc::new(named.viewed(&view)));
         let single = self.class.map(|class| (class, self.score.get()));
         let scores: ClassScores = self.scores.into_iter().chain(single).collect();
         let quantities = Quantities::read(self.quantities, &FIELDS)?;
@@ -318,6 +323,7 @@ impl LineBox {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use manifactor_geometry::So3;
     use manifactor_quadric::Camera;
 
     fn cameras() -> Cameras {
@@ -437,5 +443,24 @@ mod tests {
         let read = line_with(skewed);
         assert!(read.unused.len() == 3 && read.frame.odometry_noise.is_none());
         assert_eq!(read.pose_graph, PoseGraphChanges::default());
+    }
+
+    #[test]
+    fn the_view_of_a_wide_lens_is_kept() {
+        let lens_from_view = So3::exp(&Vector3::new(0.1, -1.2, 0.3));
+        let camera = Camera::new([300.0, 310.0, 600.0, 200.0], 640, 480).unwrap();
+        let cameras = cameras();
+        for name in [None, Some("left")] {
+            let viewed = cameras.named(name).unwrap().viewed(&CameraView { lens_from_view, camera });
+            let seen = BoundingBox::new([10.0, 20.0, 30.0, 50.0]).unwrap();
+            let scores = ClassScores::single("cup", 0.5);
+            let detections = vec![Detection::new(Arc::new(viewed), seen, scores)];
+            let before = Observation { detections, ..Observation::new(Frame::new(1.0, Se3::identity())) };
+            let after = super::parse(format_line(&before).as_bytes(), &cameras).unwrap();
+            assert_eq!(after.detections[0].camera.view().unwrap().camera, camera);
+            let [before, after] =
+                [before, after].map(|seen| seen.detections[0].camera.pose(&Se3::identity()));
+            assert!(before.local(&after).norm() < 1e-12);
+        }
     }
 }
