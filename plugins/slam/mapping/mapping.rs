@@ -12,7 +12,7 @@ use crate::settings::{DetectionSettings, OdometrySettings, RunSettings};
 use manifactor_formats::plausible;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::{Prior, Se3};
-use manifactor_graph::{FactorEntry, Graph, GraphError, Key, Noise, Values, Variable};
+use manifactor_graph::{FactorEntry, Graph, Key, Noise, Values, Variable};
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
 use manifactor_recording::camera::MountedCamera;
 use manifactor_recording::ellipse::ImageEllipse;
@@ -27,6 +27,7 @@ use std::sync::Arc;
 
 pub mod measurements;
 mod moving_objects;
+mod pose_factors;
 pub mod rejection;
 pub mod rules;
 mod warning;
@@ -144,7 +145,8 @@ impl Mapping {
             place.add_to(&mapping.frame.map_from_odometry, &mut mapping.graph, &mut mapping.values);
         }
         settings.own.add_to(&mut mapping.graph, &mut mapping.values);
-        let unused = mapping.add_pose_factors(sequence);
+        let (entries, unused) = pose_factors::entries(sequence, &mapping.values, mapping.frame.up);
+        mapping.graph.factors_mut().extend(entries);
         mapping.add_warnings(sequence, &unused, settings);
         let (poses, objects, factors) =
             (sequence.frames.len(), mapping.mapped().count(), mapping.graph.factors().len());
@@ -210,34 +212,6 @@ impl Mapping {
             semantic_factors: verdict.applied,
             left_out: verdict.left_out,
         }
-    }
-
-    /// Adds the factors on poses that arrived with frames. Returns those that do not fit.
-    fn add_pose_factors(&mut self, sequence: &Sequence) -> Vec<UnusedInput> {
-        let mut unused = vec![];
-        for (arrived, factor) in &sequence.pose_factors {
-            let find = |key: &str| {
-                let (place, value) = self.values.find(key)?;
-                Some((place, value.erased().type_id()))
-            };
-            let entry = factor.entry(&sequence.frames, self.frame.up).map_err(|error| error.to_string());
-            let fits = entry.and_then(|entry| {
-                let mut errors = vec![];
-                let resolved = entry.resolve(0, find, &mut errors);
-                resolved
-                    .map(|_| entry)
-                    .ok_or_else(|| errors.first().map_or(String::new(), GraphError::to_string))
-            });
-            match fits {
-                Ok(entry) => _ = self.graph.push(entry),
-                Err(fault) => {
-                    let timestamp = sequence.frames.get(*arrived).map_or(f64::NAN, |frame| frame.timestamp);
-                    let field = format!("`{}`", factor.label());
-                    unused.push(UnusedInput::PoseGraph { timestamp, field, fault });
-                }
-            }
-        }
-        unused
     }
 
     fn add_warnings(&mut self, sequence: &Sequence, unused: &[UnusedInput], settings: &RunSettings) {

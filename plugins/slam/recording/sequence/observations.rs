@@ -109,8 +109,8 @@ impl Sequence {
         self.apply_pose_graph(timestamp, observation.pose_graph);
     }
 
-    /// Corrects poses, and adds, replaces and removes factors on poses before the next frame. Changes of unknown
-    /// frames and factors become unused input.
+    /// Corrects poses, and adds and removes factors on poses before the next frame. Corrections of unknown frames and
+    /// removals of unknown factors become unused input.
     pub fn apply_pose_graph(&mut self, timestamp: f64, changes: PoseGraphChanges) {
         let PoseGraphChanges { factors, removed, corrected } = changes;
         let unused = |field: String, fault: String| UnusedInput::PoseGraph { timestamp, field, fault };
@@ -124,11 +124,7 @@ impl Sequence {
                 self.unused.push(unused(format!("removed `{id}`"), "there is no such factor".into()));
             }
         }
-        for factor in factors {
-            if let Some(id) = &factor.id {
-                self.pose_factors.retain(|(_, before)| !has(id, before));
-            }
-            self.pose_factors.push((self.frames.len(), factor));
-        }
+        // the one that a factor replaces stays, in case that the new one cannot be used
+        self.pose_factors.extend(factors.into_iter().map(|factor| (self.frames.len(), factor)));
     }
 }
