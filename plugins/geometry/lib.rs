@@ -28,7 +28,8 @@ pub use bundle::{
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{
     Bearing3, BearingRange2, BearingRange3, Between, ChordalBetween, ConstantVelocity, ExternalPosition,
-    Heading, Landmark, Located, OnBody, OnBodyError, Position, Prior, Range, ScaledBetween,
+    Heading, Interpolated, InterpolatedError, Landmark, Located, OnBody, OnBodyError, Position, Prior, Range,
+    ScaledBetween, TimeOffset,
 };
 pub use groups::{
     AngleError, Coordinates, CoordinatesError, ImuBias, LieGroup, MatrixError, Point1, Point2, Point3, Rn,

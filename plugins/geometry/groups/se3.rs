@@ -120,6 +120,18 @@ impl Se3 {
         let q = vx * 0.5 + (wx * vx + vx * wx) * k + wx * wx * (slope * w.dot(&v));
         block_lower(&r, &q, &r)
     }
+    /// Returns Jᵣ(ξ), with Exp(ξ + δ) ≈ Exp(ξ)·Exp(Jᵣ(ξ)δ). Defined for any rotation, also beyond a whole turn.
+    pub fn right_jacobian(xi: &Vector6<f64>) -> Matrix6<f64> {
+        let (w, v) = split_tangent(xi);
+        let (wx, vx) = (w.cross_matrix(), v.cross_matrix());
+        let e = small_angle::exponential(w.norm_squared());
+        let (a_slope, b_slope) = small_angle::exponential_slopes(w.norm_squared(), &e);
+        let (wx2, along) = (wx * wx, w.dot(&v));
+        let r = Matrix3::identity() - wx * e.a + wx2 * e.b;
+        // Derivative of r(ω) in the direction v.
+        let q = (wx * vx + vx * wx) * e.b - vx * e.a + wx2 * (b_slope * along) - wx * (a_slope * along);
+        block_lower(&r, &q, &r)
+    }
     /// Returns x·Exp(δ) with its derivative with respect to δ at δ = 0, in the slots `first..first + 6` of
     /// jets with `dim` slots. For manifolds that contain a pose.
     pub fn seed_in<J: Jet>(&self, dim: usize, first: usize) -> Se3<J> {
@@ -262,6 +274,24 @@ mod tests {
             prop_assert!((Se3::exp(&left).compose(&x).matrix() - right.matrix()).norm() < 1e-9);
             let inverse = Se3::adjoint_of_inverse(&x) * x.adjoint();
             prop_assert!((inverse - Matrix6::identity()).norm() < 1e-10);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_right_jacobian_is_that_of_exp(xi in se3_tangent(), turns in 1.0..2.0_f64) {
+            let product = Se3::right_jacobian(&xi) * Se3::inverse_right_jacobian(&xi);
+            prop_assert!((product - Matrix6::identity()).norm() < 1e-9, "{product}");
+            // Jᵣ(ξ) ξ = ξ, also beyond half a turn
+            let longer = xi * turns;
+            prop_assert!((Se3::right_jacobian(&longer) * longer - longer).norm() < 1e-10);
+            for i in 0..6 {
+                let step = Vector6::ith(i, 1e-5);
+                let exp = |sign: f64| Se3::exp(&(longer + step * sign));
+                let numeric = exp(-1.0).local(&exp(1.0)) / 2e-5;
+                let column = Se3::right_jacobian(&longer).column(i) - numeric;
+                prop_assert!(column.norm() < 1e-6, "{column}");
+            }
         }
     }
 

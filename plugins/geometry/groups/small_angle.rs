@@ -87,6 +87,17 @@ pub(crate) fn scaled_integral<T: Scalar>(theta2: T, lambda: T) -> ScaledIntegral
     ScaledIntegral { forward: [a, b, c], inverse: [a.recip(), -b / norm2, (b * b - p * c) / (a * norm2)] }
 }
 
+/// Returns a'(θ) / θ and b'(θ) / θ for `a` and `b` of [`exponential`].
+pub(crate) fn exponential_slopes(theta2: f64, e: &Exponential<f64>) -> (f64, f64) {
+    if theta2 < SERIES_LIMIT {
+        let a = [-1.0 / 12.0, 1.0 / 180.0, -1.0 / 6720.0, 1.0 / 453600.0, -1.0 / 47900160.0];
+        let b = [-1.0 / 60.0, 1.0 / 1260.0, -1.0 / 60480.0, 1.0 / 4989600.0, -1.0 / 622702080.0];
+        (series(theta2, a), series(theta2, b))
+    } else {
+        ((1.0 - theta2 * e.b - 2.0 * e.a) / theta2, (e.a - 3.0 * e.b) / theta2)
+    }
+}
+
 /// Returns (1/2 - (1 - cos θ) / θ²) / θ², with `a` from [`exponential`].
 pub(crate) fn second_integral<T: Scalar>(theta2: T, a: T) -> T {
     if theta2 < T::from(SERIES_LIMIT) {
@@ -130,6 +141,9 @@ mod tests {
         for (x, y) in [(x.cos_half, y.cos_half), (x.sin_half, y.sin_half), (x.a, y.a), (x.b, y.b)] {
             assert!((x - y).abs() < 1e-13, "{x} {y}");
         }
+        let (below_slopes, above_slopes) = (exponential_slopes(below, &x), exponential_slopes(above, &y));
+        assert!((below_slopes.0 - above_slopes.0).abs() < 1e-12, "{below_slopes:?} {above_slopes:?}");
+        assert!((below_slopes.1 - above_slopes.1).abs() < 1e-11, "{below_slopes:?} {above_slopes:?}");
         let (x, y) = (second_integral(below, x.a), second_integral(above, y.a));
         assert!((x - y).abs() < 1e-13, "{x} {y}");
         let (x, y) = (k_and_slope(below), k_and_slope(above));

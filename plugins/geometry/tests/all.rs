@@ -11,4 +11,5 @@ mod auto;
 mod catalogue;
 mod linear_solvers;
 mod scale;
+mod time_offset;
 mod valleys;

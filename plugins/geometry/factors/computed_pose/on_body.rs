@@ -1,4 +1,5 @@
 //! Factors on the pose of a body, for variables that are poses of a camera mounted on it.
+use super::variable_names;
 use crate::Se3;
 use manifactor_graph::prelude::*;
 use manifactor_graph::{
@@ -86,11 +87,8 @@ impl OnBody {
         poses: Option<Vec<usize>>,
     ) -> Result<Self, OnBodyError> {
         let signature = factor.erased().signature();
-        let mut types = signature.variables;
-        let found = || {
-            let names = types.iter().map(|id| manifactor_graph::manifold_name(*id));
-            names.collect::<Vec<_>>().join(", ") + if signature.many { ", …" } else { "" }
-        };
+        let found = || variable_names(&signature);
+        let mut types = signature.variables.clone();
         let is_pose = |place: &usize| types.get(*place) == Some(&TypeId::of::<Se3>());
         let places = match &poses {
             None => (0..types.len()).filter(is_pose).collect(),
