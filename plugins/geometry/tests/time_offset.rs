@@ -1,6 +1,8 @@
 //! The offset between the clocks of a camera and of the odometry, as a variable that all factors share.
-use manifactor_geometry::{Camera, Coordinates, Interpolated, Point1, Point3, Projection, Se3, TimeOffset};
-use manifactor_graph::{Graph, Key, Noise, Residual, Values};
+use manifactor_geometry::{
+    Camera, CameraModel, Coordinates, Interpolated, Point1, Point3, Projection, Se3, TimeOffset,
+};
+use manifactor_graph::{Graph, Key, Noise, Values};
 use manifactor_solve::{Auto, Silent, solve};
 use nalgebra::{Vector3, Vector6};
 use std::sync::Arc;
@@ -49,8 +51,7 @@ fn problem(offset: f64) -> (Graph, Values) {
         let pose = pair[0].compose(&Se3::exp(&part));
         let start = i as f64 * INTERVAL;
         for (k, point) in points.iter().enumerate() {
-            let exact = Projection::new(Coordinates::new([0.0, 0.0]).unwrap(), camera);
-            let pixel = Coordinates::new(exact.residual::<f64>((pose, point.0))).unwrap();
+            let pixel = Coordinates::new(camera.project(&pose.inverse_act(point))).unwrap();
             let seen = Arc::new(Projection::new(pixel, camera));
             let times = [start, start + INTERVAL];
             let factor = Interpolated::new(seen, times, start + DELAY, TimeOffset::Variable, None).unwrap();

@@ -73,3 +73,23 @@ fn a_document_estimates_the_focal_length_of_one_observation() {
     let radial = 1.0 + 0.0125 * k;
     assert!((camera["f"].as_f64().unwrap() * radial - 700.0).abs() < 1e-3, "{camera}");
 }
+
+#[test]
+fn a_document_estimates_the_offset_between_two_clocks() {
+    let fixed = |key: &str, value: &str| {
+        format!("[[variables]]\nkey = \"{key}\"\nvalue = {{ {value} }}\nfixed = true\n")
+    };
+    let pose = |x: f64| format!(r#"type = "se3", translation = [{x}, 0.0, 0.0], rotation = [0, 0, 0, 1]"#);
+    let point = r#"type = "point3", position = [0.2, -0.1, 2.0]"#;
+    let document = [
+        fixed("x0", &pose(0.0)),
+        fixed("x1", &pose(0.1)),
+        fixed("p0", point),
+        block("bundles.md", "toml", "interpolated"),
+    ];
+    let folder = folder(&[("clocks.toml", &document.concat())]);
+    let json = manifactor(&format!("solve {} --json", path(&folder, "clocks.toml"))).ended(0).json();
+    // the pixel is right of the centre by 0.07 of the depth, for a camera at x = 0.06
+    let offset = json["values"]["offset"]["position"][0].as_f64().unwrap();
+    assert!((offset - 0.02).abs() < 1e-9, "{json}");
+}
