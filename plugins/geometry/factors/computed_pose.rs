@@ -2,7 +2,7 @@
 use manifactor_graph::catalogue::Signature;
 
 mod interpolated;
-mod motion;
+mod interpolation;
 mod on_body;
 mod time_offset;
 

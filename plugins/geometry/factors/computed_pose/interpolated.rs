@@ -1,5 +1,5 @@
 //! Factors on the pose at a time between two poses.
-use super::motion::Motion;
+use super::interpolation::Interpolation;
 use super::{TimeOffset, variable_names};
 use crate::{Point1, Se3};
 use manifactor_graph::prelude::*;
@@ -138,7 +138,9 @@ impl Interpolated {
         let time_offset = time_offset.into();
         let elapsed = time - times[0];
         let is_within = match time_offset {
-            TimeOffset::Constant(offset) => Motion::FRACTIONS.contains(&((elapsed + offset) / interval)),
+            TimeOffset::Constant(offset) => {
+                Interpolation::FRACTIONS.contains(&((elapsed + offset) / interval))
+            }
             // a clock may be far off; the initial value of the variable brings the time between the poses
             TimeOffset::Variable => elapsed.is_finite(),
         };
@@ -216,15 +218,15 @@ struct Compiled {
 }
 
 impl Compiled {
-    /// Returns the motion between the two poses. `None` if a variable is of another type.
-    fn motion(&self, variables: &[&dyn Any]) -> Option<Motion> {
+    /// Returns the pose at the time of the measurement. `None` if a variable is of another type.
+    fn interpolation(&self, variables: &[&dyn Any]) -> Option<Interpolation> {
         let pose = |i: usize| variables.get(i)?.downcast_ref::<Se3>();
         let (first, second) = (pose(self.place)?, pose(self.place + 1)?);
         let offset = match self.offset {
             Some(constant) => constant,
             None => variables.last()?.downcast_ref::<Point1>()?.x,
         };
-        Some(Motion::new(first, second, (self.elapsed + offset) / self.interval))
+        Some(Interpolation::new(first, second, (self.elapsed + offset) / self.interval))
     }
 
     /// Returns the index among the variables for a variable of `factor`, the first one for its pose.
@@ -264,14 +266,16 @@ impl DynamicResidual for Compiled {
         &self.dimensions
     }
     fn is_defined(&self, variables: &[&dyn Any]) -> bool {
-        self.motion(variables).is_some_and(|motion| {
-            motion.is_defined()
-                && self.with_pose(&motion.pose, variables, |factor, x| factor.is_defined(x)).unwrap_or(false)
+        self.interpolation(variables).is_some_and(|interpolation| {
+            interpolation.is_defined()
+                && self
+                    .with_pose(&interpolation.pose, variables, |factor, x| factor.is_defined(x))
+                    .unwrap_or(false)
         })
     }
     fn residual(&self, variables: &[&dyn Any], residual: &mut [f64]) {
-        let Some(motion) = self.motion(variables) else { return };
-        if let Some(rows) = self.with_pose(&motion.pose, variables, |factor, x| factor.residual(x)) {
+        let Some(interpolation) = self.interpolation(variables) else { return };
+        if let Some(rows) = self.with_pose(&interpolation.pose, variables, |factor, x| factor.residual(x)) {
             residual.copy_from_slice(&rows);
         }
     }
@@ -282,8 +286,8 @@ impl DynamicResidual for Compiled {
         residual: &mut [f64],
         blocks: &mut DynamicBlocks,
     ) {
-        let Some(motion) = self.motion(variables) else { return };
-        let linear = self.with_pose(&motion.pose, variables, |factor, x| factor.linearize(x));
+        let Some(interpolation) = self.interpolation(variables) else { return };
+        let linear = self.with_pose(&interpolation.pose, variables, |factor, x| factor.linearize(x));
         let Some(linear) = linear else { return };
         residual.copy_from_slice(&linear.residual);
         for (inner, jacobian) in linear.jacobians.iter().enumerate() {
@@ -293,7 +297,7 @@ impl DynamicResidual for Compiled {
             }
         }
         let by_pose = &linear.jacobians[self.place];
-        let derivatives = motion.derivatives();
+        let derivatives = interpolation.derivatives();
         for (outer, derivative) in (self.place..).zip(&derivatives.by_poses) {
             if free[outer] {
                 blocks.block_mut(outer).copy_from_slice((by_pose * derivative).as_slice());

@@ -6,8 +6,8 @@ use std::ops::RangeInclusive;
 /// Largest rotation between the two poses, in radians: at π, the shortest rotation jumps.
 const MAX_ROTATION: f64 = 3.1;
 
-/// The motion from a pose to another one, and a time in it.
-pub(super) struct Motion {
+/// A pose on the way from one pose to a second one.
+pub(super) struct Interpolation {
     /// ξ = Log(X₀⁻¹ X₁).
     twist: Vector6<f64>,
     /// s, the time as a fraction of the interval.
@@ -24,7 +24,7 @@ pub(super) struct Derivatives {
     pub(super) by_fraction: Vector6<f64>,
 }
 
-impl Motion {
+impl Interpolation {
     /// Fractions at which the pose is defined: a time offset changes during a solve, and one interval on either side
     /// leaves room for that.
     pub(super) const FRACTIONS: RangeInclusive<f64> = -1.0..=2.0;
