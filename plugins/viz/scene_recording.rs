@@ -216,7 +216,13 @@ impl SceneRecording {
                 channel
             }
         };
-        let time = Time::nanoseconds(timestamp);
+        let time = Time::nanoseconds(timestamp).ok_or_else(|| {
+            let fault = format!(
+                "a map of MCAP has no time {timestamp} s: expected timestamps from 0 to {:.0} s",
+                Time::END_S
+            );
+            McapError::Io(io::Error::new(ErrorKind::InvalidInput, fault))
+        })?;
         let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
         let data = serde_json::to_vec(message).map_err(|error| McapError::Io(error.into()))?;
         self.writer.write_to_known_channel(&header, &data)

@@ -22,7 +22,7 @@ mod rig;
 pub mod stream;
 mod tum;
 
-pub use camera::{CalibrationFile, CameraChoice};
+pub use camera::{CalibrationFile, CameraChoice, CameraPose};
 pub use detections::DetectionsFile;
 pub use interpolation::NoPose;
 pub use json_lines::parse;

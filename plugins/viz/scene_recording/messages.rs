@@ -137,17 +137,19 @@ pub(super) struct PosesInFrame {
 }
 
 impl Time {
-    /// Returns a time in seconds; one before the epoch is the epoch.
+    /// End of the range of times. Unit: seconds.
+    pub(super) const END_S: f64 = 1.8e10;
+
+    /// Returns a time in seconds; one out of range is the epoch.
     pub(super) fn of(seconds: f64) -> Self {
-        let nanoseconds = Self::nanoseconds(seconds);
+        let nanoseconds = Self::nanoseconds(seconds).unwrap_or_default();
         let (sec, rest) = (nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
         Self { sec, nsec: u32::try_from(rest).unwrap_or_default() }
     }
 
-    /// Returns a time in nanoseconds; one before the epoch is the epoch.
-    pub(super) fn nanoseconds(seconds: f64) -> u64 {
-        // a negative number becomes 0
-        (seconds * 1e9).round() as u64
+    /// Returns a time in nanoseconds, if it is in range: the format counts them from the epoch in 64 bits.
+    pub(super) fn nanoseconds(seconds: f64) -> Option<u64> {
+        (0.0..Self::END_S).contains(&seconds).then(|| (seconds * 1e9).round() as u64)
     }
 }
 

@@ -91,7 +91,14 @@ fn only_a_map_is_overwritten() {
 }
 
 #[test]
-fn times_before_the_epoch_are_the_epoch() {
-    assert_eq!((Time::nanoseconds(-1.0), Time::nanoseconds(1.5)), (0, 1_500_000_000));
+fn a_time_that_the_format_does_not_have_is_an_error() {
+    assert_eq!(Time::nanoseconds(1.5), Some(1_500_000_000));
     assert_eq!(Time::of(1.25).nsec, 250_000_000);
+    let folder = tempfile::tempdir().unwrap();
+    for (i, time) in [-1.0, 1e12, f64::NAN].into_iter().enumerate() {
+        let mut map = SceneRecording::create(&folder.path().join(format!("{i}.mcap")), false).unwrap();
+        map.add_pose("ours", time, &Se3::identity());
+        let error = map.finish().unwrap_err().to_string();
+        assert!(error.contains("expected timestamps from 0 to 18000000000 s"), "{error}");
+    }
 }

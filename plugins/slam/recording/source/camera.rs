@@ -1,6 +1,6 @@
 //! Cameras by name.
 use super::SourceError;
-use manifactor_geometry::{AnyCamera, Distortion, KannalaBrandt, RadialTangential};
+use manifactor_geometry::{AnyCamera, Distortion, KannalaBrandt, RadialTangential, Se3};
 use manifactor_quadric::Camera;
 use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
@@ -33,6 +33,56 @@ pub enum CameraChoice {
     Model(Arc<dyn AnyCamera>),
     /// A calibration file of Kalibr, OpenCV, ROS or COLMAP.
     File(CalibrationFile),
+}
+
+/// Pose of a camera on a body.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum CameraPose {
+    /// The pose: the translation in metres, and the rotation as a unit quaternion (x, y, z, w).
+    Pose(Se3),
+    /// A calibration file of Kalibr: the pose in the frame of its IMU (`T_cam_imu`) or, without an IMU, in that of its
+    /// first camera (`T_cn_cnm1`).
+    File(CalibrationFile),
+}
+
+impl From<Se3> for CameraPose {
+    fn from(pose: Se3) -> Self {
+        Self::Pose(pose)
+    }
+}
+
+impl<'de> Deserialize<'de> for CameraPose {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        manifactor_config::deserialize_with(from, |node| {
+            let pose = match node.field("file") {
+                Some(_) => Self::File(node.try_read()?),
+                None => Self::Pose(node.try_read()?),
+            };
+            Ok(Box::new(pose))
+        })
+    }
+}
+
+impl CameraPose {
+    /// Returns the pose in the frame of the body. A calibration file is relative to `folder`.
+    ///
+    /// # Errors
+    /// A calibration file that cannot be read, or has no pose.
+    pub(super) fn read(&self, folder: &Path) -> Result<Se3, SourceError> {
+        match self {
+            Self::Pose(pose) => Ok(*pose),
+            Self::File(file) => file.read_pose(folder),
+        }
+    }
+
+    /// Returns the calibration file, if there is one.
+    pub(super) fn file(&self) -> Option<&Path> {
+        match self {
+            Self::File(calibration) => Some(&calibration.file),
+            Self::Pose(_) => None,
+        }
+    }
 }
 
 /// Cameras of TUM RGB-D.

@@ -4,11 +4,10 @@ use super::interpolation::{InterpolatedFrames, PoseOrImage};
 use super::rectification::Rectification;
 use super::rig::Rig;
 use super::stream::FrameStream;
-use super::{CameraChoice, InputFolders, SequenceSource, SourceError, found_files};
+use super::{CameraChoice, CameraPose, InputFolders, SequenceSource, SourceError, found_files};
 use crate::camera::Cameras;
 use crate::sequence::{Observation, Sequence, SequenceHeader};
 use manifactor_formats::FormatError;
-use manifactor_geometry::Se3;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
@@ -63,10 +62,10 @@ pub struct JsonLines {
     /// The camera.
     pub camera: CameraChoice,
     /// Pose of the camera in the frame of the body, if odometry, ground truth, `factors` and `corrected` are about poses of a body, such as a
-    /// robot: the translation in metres, and the rotation as a unit quaternion (x, y, z, w). The camera frame has x
-    /// to the right, y down and z forward. Default: they are poses of the camera.
+    /// robot: a pose, or the `file` of a calibration. The camera frame has x to the right, y down and z forward. Default:
+    /// they are poses of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub body_from_camera: Option<Se3>,
+    pub body_from_camera: Option<CameraPose>,
     /// Further cameras on the same body, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub cameras: BTreeMap<String, FurtherCamera>,
@@ -93,7 +92,7 @@ pub struct FurtherCamera {
     /// The camera.
     pub camera: CameraChoice,
     /// Pose of the camera in the frame of the body; without `source.body_from_camera`, in the frame of the first camera.
-    pub body_from_camera: Se3,
+    pub body_from_camera: CameraPose,
 }
 
 /// True once standard input has been read: it can be read only once.
@@ -117,8 +116,10 @@ impl SequenceSource for JsonLines {
     }
 
     fn find_files(&self, folders: &InputFolders) -> Result<Vec<PathBuf>, SourceError> {
-        let files = [self.file.as_deref(), self.ground_truth.as_deref(), self.camera.file()];
-        let others = self.cameras.values().map(|further| further.camera.file());
+        let pose = self.body_from_camera.as_ref().and_then(CameraPose::file);
+        let files = [self.file.as_deref(), self.ground_truth.as_deref(), self.camera.file(), pose];
+        let further = self.cameras.values();
+        let others = further.flat_map(|further| [further.camera.file(), further.body_from_camera.file()]);
         found_files(&folders.document, &files.into_iter().chain(others).collect::<Vec<_>>())
     }
 
@@ -167,18 +168,20 @@ impl JsonLines {
     ) -> Result<FrameStream, SourceError> {
         let truth = self.ground_truth.as_deref().map(|file| read_ground_truth(&folders.document, Some(file)));
         let mut ground_truth = truth.transpose()?.flatten();
-        let extrinsics = self.body_from_camera.map(Extrinsics::new);
+        let mounting = self.body_from_camera.as_ref().map(|pose| pose.read(&folders.document));
+        let body_from_camera = mounting.transpose()?;
+        let extrinsics = body_from_camera.map(Extrinsics::new);
         if let (Some(extrinsics), Some(truth)) = (extrinsics, &mut ground_truth) {
             extrinsics.apply_to_ground_truth(truth);
         }
         let lens = Rectification::new(&self.camera, None, &folders.document)?;
         let others =
             self.cameras.iter().map(|(name, further)| (name, &further.camera, &further.body_from_camera));
-        let rig = Rig::new(lens, self.body_from_camera).with(others, &folders.document)?;
+        let rig = Rig::new(lens, body_from_camera).with(others, &folders.document)?;
         let cameras = rig.cameras.clone();
         let opening = SequenceHeader {
             cameras: cameras.clone(),
-            body_from_camera: self.body_from_camera,
+            body_from_camera,
             up: self.up,
             georeference: None,
             ground_truth,

@@ -1,13 +1,13 @@
 use super::assemble::{
     TimeMatching, default_share, is_default_share, read_ground_truth, read_matched, read_objects,
 };
-use super::camera::CameraChoice;
+use super::camera::{CameraChoice, CameraPose};
 use super::extrinsics::Extrinsics;
 use super::rectification::Rectification;
 use super::rig::Rig;
 use super::{DetectionsFile, InputFolders, SequenceSource, SourceError, found_files, usual_files};
 use crate::sequence::Sequence;
-use manifactor_geometry::{Distortion, Se3};
+use manifactor_geometry::Distortion;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
@@ -34,10 +34,10 @@ pub struct RecordedFiles {
     /// The camera.
     pub camera: CameraChoice,
     /// Pose of the camera in the frame of the body, if odometry and ground truth are poses of a body, such as a
-    /// robot: the translation in metres, and the rotation as a unit quaternion (x, y, z, w). The camera frame has x
-    /// to the right, y down and z forward. Default: they are poses of the camera.
+    /// robot: a pose, or the `file` of a calibration. The camera frame has x to the right, y down and z forward. Default:
+    /// they are poses of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub body_from_camera: Option<Se3>,
+    pub body_from_camera: Option<CameraPose>,
     /// Further cameras on the same body, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub cameras: BTreeMap<String, FurtherRecordedCamera>,
@@ -81,7 +81,7 @@ pub struct FurtherRecordedCamera {
     /// The camera.
     pub camera: CameraChoice,
     /// Pose of the camera in the frame of the body; without `source.body_from_camera`, in the frame of the first camera.
-    pub body_from_camera: Se3,
+    pub body_from_camera: CameraPose,
     /// Detections in its images, in the folder: a CSV file, or a table with the `format` of another program.
     pub detections: DetectionsFile,
 }
@@ -100,10 +100,12 @@ fn exact() -> NotNegative {
 impl SequenceSource for RecordedFiles {
     fn load(&self, folders: &InputFolders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.folder, "source.folder")?;
+        let mounting = self.body_from_camera.as_ref().map(|pose| pose.read(&folders.document));
+        let body_from_camera = mounting.transpose()?;
         let lens = Rectification::new(&self.camera, self.distortion, &folders.document)?;
         let others =
             self.cameras.iter().map(|(name, further)| (name, &further.camera, &further.body_from_camera));
-        let rig = Rig::new(lens, self.body_from_camera).with(others, &folders.document)?;
+        let rig = Rig::new(lens, body_from_camera).with(others, &folders.document)?;
         let by = TimeMatching {
             within: self.max_time_difference,
             without_pose: self.max_without_pose,
@@ -119,13 +121,13 @@ impl SequenceSource for RecordedFiles {
             let objects = read_objects(&folder, self.objects.as_deref())?;
             truth.get_or_insert_default().objects = objects;
         }
-        if let Some(extrinsics) = self.body_from_camera.map(Extrinsics::new) {
+        if let Some(extrinsics) = body_from_camera.map(Extrinsics::new) {
             frames.iter_mut().for_each(|frame| extrinsics.apply_to_pose(&mut frame.world_from_camera));
             truth.iter_mut().for_each(|truth| extrinsics.apply_to_ground_truth(truth));
         }
         Ok(Sequence {
             cameras: rig.cameras,
-            body_from_camera: self.body_from_camera,
+            body_from_camera,
             frames,
             detections,
             up: self.up,
@@ -145,8 +147,10 @@ impl SequenceSource for RecordedFiles {
         let files: Vec<_> =
             named.map(Some).chain([self.ground_truth.as_deref(), self.objects.as_deref()]).collect();
         let found = found_files(&folder, &files)?;
-        let others = self.cameras.values().map(|further| further.camera.file());
-        let cameras: Vec<_> = std::iter::once(self.camera.file()).chain(others).collect();
+        let further = self.cameras.values();
+        let others = further.flat_map(|further| [further.camera.file(), further.body_from_camera.file()]);
+        let pose = self.body_from_camera.as_ref().and_then(CameraPose::file);
+        let cameras: Vec<_> = [self.camera.file(), pose].into_iter().chain(others).collect();
         Ok([found, found_files(&folders.document, &cameras)?, usual_files(&folder)].concat())
     }
 

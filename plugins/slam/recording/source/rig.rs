@@ -1,6 +1,6 @@
 //! All cameras of a source, with the rectification of their boxes.
 use super::rectification::Rectification;
-use super::{CameraChoice, SourceError};
+use super::{CameraChoice, CameraPose, SourceError};
 use crate::camera::Cameras;
 use crate::sequence::{Detection, Observation, UnusedInput};
 use manifactor_geometry::Se3;
@@ -28,11 +28,11 @@ impl Rig {
     /// If a name is not a word, or a calibration file cannot be read.
     pub(super) fn with<'a>(
         mut self,
-        cameras: impl IntoIterator<Item = (&'a String, &'a CameraChoice, &'a Se3)>,
+        cameras: impl IntoIterator<Item = (&'a String, &'a CameraChoice, &'a CameraPose)>,
         folder: &Path,
     ) -> Result<Self, SourceError> {
         for (name, camera, body_from_camera) in cameras {
-            self.add(name, Rectification::new(camera, None, folder)?, *body_from_camera)?;
+            self.add(name, Rectification::new(camera, None, folder)?, body_from_camera.read(folder)?)?;
         }
         Ok(self)
     }

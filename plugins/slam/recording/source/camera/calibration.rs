@@ -3,8 +3,9 @@ use super::with_distortion;
 use crate::source::SourceError;
 use manifactor_config::{Document, Errors, Format, Value};
 use manifactor_formats::read_text;
-use manifactor_geometry::{AnyCamera, Camera, DoubleSphere, ExtendedUnified};
+use manifactor_geometry::{AnyCamera, Camera, DoubleSphere, ExtendedUnified, Se3};
 use manifactor_graph::checked::{Positive, Share};
+use nalgebra::Matrix4;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -21,8 +22,20 @@ pub struct CalibrationFile {
     pub name: Option<String>,
 }
 
-/// A camera of a file with its name.
-type NamedCamera = (String, Result<Arc<dyn AnyCamera>, String>);
+/// A camera of a file.
+struct NamedCamera {
+    name: String,
+    camera: Result<Arc<dyn AnyCamera>, String>,
+    mounting: Result<Mounting, String>,
+}
+
+/// Place and clock of a camera on a body.
+#[derive(Clone, Copy)]
+struct Mounting {
+    camera_from_body: Se3,
+    /// Time on the clock of the body minus time on the clock of the camera. Unit: seconds.
+    time_offset: f64,
+}
 
 /// A camera in the form of Kalibr.
 #[derive(Deserialize)]
@@ -34,6 +47,15 @@ struct KalibrCamera {
     #[serde(default)]
     distortion_coeffs: Vec<f64>,
     resolution: [u32; 2],
+    /// Pose of the IMU in the frame of the camera.
+    #[serde(default, rename = "T_cam_imu")]
+    camera_from_imu: Option<[[f64; 4]; 4]>,
+    /// Pose of the camera before this one, in its frame.
+    #[serde(default, rename = "T_cn_cnm1")]
+    camera_from_last: Option<[[f64; 4]; 4]>,
+    /// Time on the clock of the IMU minus time on the clock of the camera. Unit: seconds.
+    #[serde(default)]
+    timeshift_cam_imu: f64,
 }
 
 /// A matrix in the form of OpenCV and ROS.
@@ -60,43 +82,58 @@ impl CalibrationFile {
     /// # Errors
     /// A file that cannot be read, a camera that is not in it, or a model that is not supported.
     pub(in crate::source) fn read(&self, folder: &Path) -> Result<Arc<dyn AnyCamera>, SourceError> {
+        let NamedCamera { name, camera, .. } = self.find(folder)?;
+        camera.map_err(|reason| self.fault(folder, format!("camera `{name}`: {reason}")))
+    }
+
+    /// Reads the pose of the camera in the frame of the IMU or, without an IMU, of the first camera.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a camera that is not in it, or a file without poses.
+    pub(in crate::source) fn read_pose(&self, folder: &Path) -> Result<Se3, SourceError> {
+        let NamedCamera { name, mounting, .. } = self.find(folder)?;
+        let mounting = mounting.map_err(|reason| self.fault(folder, format!("camera `{name}`: {reason}")));
+        let Mounting { camera_from_body, time_offset } = mounting?;
+        if time_offset != 0.0 {
+            tracing::warn!(
+                "{}: `timeshift_cam_imu` of `{name}` is not used: add {time_offset} s to the timestamps of the images",
+                self.file.display()
+            );
+        }
+        Ok(camera_from_body.inverse())
+    }
+
+    fn fault(&self, folder: &Path, fault: String) -> SourceError {
+        SourceError::Calibration { file: folder.join(&self.file), fault }
+    }
+
+    fn find(&self, folder: &Path) -> Result<NamedCamera, SourceError> {
         let file = folder.join(&self.file);
         let text = read_text(&file)?;
-        let fault = |fault: String| SourceError::Calibration { file: file.clone(), fault };
-        let cameras = if file.extension().is_some_and(|extension| extension == "txt") {
+        let fault = |fault: String| self.fault(folder, fault);
+        let mut cameras = if file.extension().is_some_and(|extension| extension == "txt") {
             colmap(&text)
         } else {
             yaml(&file, &text)?
         };
-        let names = || cameras.iter().map(|(name, _)| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-        let found = match &self.name {
+        let names = || cameras.iter().map(|found| format!("`{}`", found.name)).collect::<Vec<_>>().join(", ");
+        let place = match &self.name {
             Some(wanted) => {
-                let mut named = cameras.iter().filter(|(name, _)| name == wanted);
+                let mut named = (0..cameras.len()).filter(|i| cameras[*i].name == *wanted);
                 match (named.next(), named.next()) {
-                    (Some(found), None) => found,
-                    (Some(_), Some(_)) => return Err(fault(format!("there are several cameras `{wanted}`"))),
-                    (None, _) => {
-                        return Err(fault(format!("there is no camera `{wanted}`; there are {}", names())));
-                    }
+                    (Some(found), None) => Ok(found),
+                    (Some(_), Some(_)) => Err(format!("there are several cameras `{wanted}`")),
+                    (None, _) => Err(format!("there is no camera `{wanted}`; there are {}", names())),
                 }
             }
-            None => match &cameras[..] {
-                [only] => only,
-                [] => {
-                    return Err(fault(
-                        "expected the cameras of Kalibr, OpenCV, ROS or COLMAP, found none".into(),
-                    ));
-                }
-                _ => {
-                    return Err(fault(format!(
-                        "there are several cameras: set `name` to one of {}",
-                        names()
-                    )));
-                }
+            None => match cameras.len() {
+                1 => Ok(0),
+                0 => Err("expected the cameras of Kalibr, OpenCV, ROS or COLMAP, found none".into()),
+                _ => Err(format!("there are several cameras: set `name` to one of {}", names())),
             },
         };
-        let (name, camera) = found;
-        camera.clone().map_err(|reason| fault(format!("camera `{name}`: {reason}")))
+        let place = place.map_err(fault)?;
+        Ok(cameras.swap_remove(place))
     }
 }
 
@@ -112,16 +149,48 @@ fn yaml(file: &Path, text: &str) -> Result<Vec<NamedCamera>, SourceError> {
         let read = root.read::<OpenCvCamera>(&errors);
         let camera = errors.finish(read)?;
         let name = root.field("camera_name").and_then(|name| name.try_read::<String>().ok());
-        return Ok(vec![(name.unwrap_or_else(|| "camera".into()), opencv(&camera))]);
+        let (name, camera) = (name.unwrap_or_else(|| "camera".into()), opencv(&camera));
+        return Ok(vec![NamedCamera { name, camera, mounting: Err(NO_POSE.into()) }]);
     }
     let Value::Table(table) = &root.value else { return Ok(vec![]) };
-    let mut cameras = vec![];
+    let (mut cameras, mut last, mut has_poses) = (vec![], None, false);
     for (name, field) in table.iter().filter(|(_, field)| field.node.field("camera_model").is_some()) {
         if let Some(camera) = field.node.read::<KalibrCamera>(&errors) {
-            cameras.push((name.clone(), kalibr(&camera)));
+            let mounting = camera.mounting(last);
+            has_poses |= camera.camera_from_imu.is_some() || camera.camera_from_last.is_some();
+            cameras.push(NamedCamera {
+                name: name.clone(),
+                camera: kalibr(&camera),
+                mounting: mounting.clone(),
+            });
+            last = Some(mounting);
         }
     }
+    if !has_poses {
+        cameras.iter_mut().for_each(|camera| camera.mounting = Err(NO_POSE.into()));
+    }
     Ok(errors.finish(Some(cameras))?)
+}
+
+/// Fault of a file without poses.
+const NO_POSE: &str = "expected its pose, `T_cam_imu` or `T_cn_cnm1` of Kalibr";
+
+impl KalibrCamera {
+    /// Returns the place on the body, from that of the camera before it. The body is the IMU or, without it, the first
+    /// camera.
+    fn mounting(&self, last: Option<Result<Mounting, String>>) -> Result<Mounting, String> {
+        let pose = |name: &str, rows: &[[f64; 4]; 4]| {
+            let matrix = Matrix4::from_fn(|row, column| rows[row][column]);
+            Se3::try_from_matrix(&matrix).map_err(|error| format!("`{name}`: {error}"))
+        };
+        let camera_from_body = match (&self.camera_from_imu, &self.camera_from_last, last) {
+            (Some(rows), ..) => pose("T_cam_imu", rows)?,
+            (None, Some(rows), Some(last)) => pose("T_cn_cnm1", rows)?.compose(&last?.camera_from_body),
+            (None, None, None) => Se3::identity(),
+            (None, ..) => return Err(NO_POSE.into()),
+        };
+        Ok(Mounting { camera_from_body, time_offset: self.timeshift_cam_imu })
+    }
 }
 
 fn opencv(camera: &OpenCvCamera) -> Result<Arc<dyn AnyCamera>, String> {
@@ -141,7 +210,8 @@ fn opencv(camera: &OpenCvCamera) -> Result<Arc<dyn AnyCamera>, String> {
 }
 
 fn kalibr(camera: &KalibrCamera) -> Result<Arc<dyn AnyCamera>, String> {
-    let KalibrCamera { camera_model, intrinsics, distortion_model, distortion_coeffs, resolution } = camera;
+    let KalibrCamera { camera_model, intrinsics, distortion_model, distortion_coeffs, resolution, .. } =
+        camera;
     let [width, height] = *resolution;
     let pinhole = |numbers: [f64; 4]| Camera::new(numbers, width, height).map_err(|error| error.to_string());
     let is_distorted = distortion_model.as_deref().is_some_and(|model| model != "none");
@@ -184,7 +254,9 @@ fn colmap(text: &str) -> Vec<NamedCamera> {
     rows.map(|(number, line)| {
         let name = line.split_whitespace().next().unwrap_or_default().to_owned();
         let camera = manifactor_formats::colmap::camera(line);
-        (name, camera.map(|camera| camera.lens.camera()).map_err(|error| format!("line {number}: {error}")))
+        let camera = camera.map(|camera| camera.lens.camera());
+        let camera = camera.map_err(|error| format!("line {number}: {error}"));
+        NamedCamera { name, camera, mounting: Err(NO_POSE.into()) }
     })
     .collect()
 }
@@ -192,7 +264,7 @@ fn colmap(text: &str) -> Vec<NamedCamera> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector2;
+    use nalgebra::{Vector2, Vector3};
 
     fn read(name: &str, text: &str, camera: Option<&str>) -> Result<Arc<dyn AnyCamera>, String> {
         let folder = tempfile::tempdir().unwrap();
@@ -282,5 +354,34 @@ cam2:
             let error = read("cameras.txt", wrong, None).unwrap_err();
             assert!(error.contains(words) && error.contains("cameras.txt"), "{error}");
         }
+    }
+
+    /// Returns the pose of a camera of this text on the body.
+    fn pose(text: &str, camera: &str) -> Result<Se3, String> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("chain.yaml"), text).unwrap();
+        let file = CalibrationFile { file: "chain.yaml".into(), name: Some(camera.into()) };
+        file.read_pose(folder.path()).map_err(|error| error.to_string())
+    }
+
+    /// Each camera is 0.1 m to the right of the one before.
+    const FROM_LAST: &str = "  T_cn_cnm1:\n  - [1.0, 0.0, 0.0, -0.1]\n  - [0.0, 1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, 0.0, 0.0, 1.0]\n";
+
+    #[test]
+    fn poses_of_kalibr_are_read_along_the_chain() {
+        let chain = KALIBR.replace("  camera_model: ds", &format!("{FROM_LAST}  camera_model: ds"));
+        let chain = chain.replace("  camera_model: omni", &format!("{FROM_LAST}  camera_model: omni"));
+        assert_eq!(pose(&chain, "cam0"), Ok(Se3::identity()));
+        assert!((pose(&chain, "cam2").unwrap().translation - Vector3::new(0.2, 0.0, 0.0)).norm() < 1e-12);
+        // x of the camera is -y of the IMU, y is -z, z is x
+        let imu = "  T_cam_imu:\n  - [0.0, -1.0, 0.0, 0.3]\n  - [0.0, 0.0, -1.0, 0.0]\n  - [1.0, 0.0, 0.0, -0.5]\n  - [0.0, 0.0, 0.0, 1.0]\n";
+        let chain = chain.replace("  camera_model: pinhole", &format!("{imu}  camera_model: pinhole"));
+        assert!((pose(&chain, "cam0").unwrap().translation - Vector3::new(0.5, 0.3, 0.0)).norm() < 1e-12);
+        assert!((pose(&chain, "cam1").unwrap().translation - Vector3::new(0.5, 0.2, 0.0)).norm() < 1e-12);
+        let error = pose(KALIBR, "cam1").unwrap_err();
+        assert!(error.contains("camera `cam1`: expected its pose, `T_cam_imu` or `T_cn_cnm1`"), "{error}");
+        let wrong = chain.replace("[1.0, 0.0, 0.0, -0.5]", "[2.0, 0.0, 0.0, -0.5]");
+        let error = pose(&wrong, "cam0").unwrap_err();
+        assert!(error.contains("`T_cam_imu`"), "{error}");
     }
 }
