@@ -23,6 +23,9 @@ pub struct VisualInertialDocument {
     /// True poses of the IMU, for evaluation: a trajectory in the TUM format, or CSV as in EuRoC.
     #[serde(default)]
     pub ground_truth: Option<PathBuf>,
+    /// File of Kalibr with the noise densities of the IMU (YAML), in place of `settings.noise`.
+    #[serde(default)]
+    pub imu_noise: Option<PathBuf>,
     /// Folder for the results. Default: `out/vio`.
     #[serde(default = "default_output")]
     pub output: PathBuf,

@@ -1,6 +1,7 @@
 //! Several cameras on one body.
 use crate::online::{both, run_of};
 use manifactor_geometry::{Camera, CameraModel, KannalaBrandt, Se3, So3};
+use manifactor_graph::Manifold;
 use manifactor_quadric::DualQuadric;
 use manifactor_slam::camera::Cameras;
 use manifactor_slam::estimate::Estimate;
@@ -10,7 +11,8 @@ use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::{Detection, Sequence};
 use manifactor_solve::Silent;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector3};
+use std::path::Path;
 use std::sync::Arc;
 
 /// A robot that drives a circle among objects, with a camera that looks ahead and down to the centre, and one that looks
@@ -156,13 +158,11 @@ fn outline(lens: &KannalaBrandt, pose: &Se3, object: &DualQuadric) -> Option<[f6
     is_inside.then_some(bounds)
 }
 
-#[test]
-fn a_fisheye_maps_what_is_beside_and_behind_it() {
-    let (objects, lines, boxes) = fisheye_stream();
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("frames.jsonl"), lines).unwrap();
-    let file = folder.path().join("frames.jsonl");
-    let document = format!(
+/// Writes a stream, and returns its document.
+fn fisheye_document(folder: &Path, lines: &str) -> String {
+    let file = folder.join("frames.jsonl");
+    std::fs::write(&file, lines).unwrap();
+    format!(
         r#"
 detections = {{ noise = {{ sigma = 1.0 }} }}
 [source]
@@ -171,8 +171,41 @@ file = "{}"
 camera = {{ type = "kannala_brandt", fx = 200.0, fy = 200.0, cx = 400.0, cy = 400.0, width = 800, height = 800, distortion = [0.0, 0.0, 0.0, 0.0] }}
 "#,
         file.display()
-    );
-    let run = run_of(&document, &[]);
+    )
+}
+
+#[test]
+fn the_pose_of_a_camera_on_the_body_comes_from_a_file_of_kalibr() {
+    let (_, lines, _) = fisheye_stream();
+    let folder = tempfile::tempdir().unwrap();
+    let document = fisheye_document(folder.path(), &lines);
+    let matrix =
+        "[[0.0, -1.0, 0.0, 0.05], [0.0, 0.0, -1.0, 0.1], [1.0, 0.0, 0.0, -0.2], [0.0, 0.0, 0.0, 1.0]]";
+    let chain = folder.path().join("chain.yaml");
+    let intrinsics = "camera_model: pinhole\n  distortion_model: equidistant\n  distortion_coeffs: [0, 0, 0, 0]\n  intrinsics: [200.0, 200.0, 400.0, 400.0]\n  resolution: [800, 800]";
+    std::fs::write(&chain, format!("cam0:\n  T_cam_imu: {matrix}\n  {intrinsics}\n")).unwrap();
+    let chain = chain.display();
+    let camera = format!("source.camera={{ file = \"{chain}\" }}");
+    let from_file = format!("source.body_from_camera={{ file = \"{chain}\" }}");
+    let camera_from_body = Matrix4::from_row_slice(&[
+        0.0, -1.0, 0.0, 0.05, 0.0, 0.0, -1.0, 0.1, 1.0, 0.0, 0.0, -0.2, 0.0, 0.0, 0.0, 1.0,
+    ]);
+    let pose = Se3::try_from_matrix(&camera_from_body).unwrap().inverse();
+    let given = format!("source.body_from_camera={}", serde_json::to_string(&pose).unwrap());
+    let poses = |sets: &[&str]| -> Vec<Se3> {
+        let sequence = sequence_of(&run_of(&document, sets));
+        sequence.frames.iter().map(|frame| frame.world_from_camera).collect()
+    };
+    let (read, expected) = (poses(&[&camera, &from_file]), poses(&[&given]));
+    assert!(read.len() == 40 && read.iter().zip(&expected).all(|(a, b)| a.local(b).norm() < 1e-12));
+    assert!(read[0].local(&poses(&[])[0]).norm() > 0.1);
+}
+
+#[test]
+fn a_fisheye_maps_what_is_beside_and_behind_it() {
+    let (objects, lines, boxes) = fisheye_stream();
+    let folder = tempfile::tempdir().unwrap();
+    let run = run_of(&fisheye_document(folder.path(), &lines), &[]);
     let (estimate, _) = estimate(&run, sequence_of(&run));
     let landmarks = estimate.landmarks();
     let often: Vec<usize> = (0..objects.len()).filter(|k| boxes[*k] >= 10).collect();

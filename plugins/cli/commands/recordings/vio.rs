@@ -8,18 +8,21 @@ use crate::output::text::count;
 use crate::output::watch::Watch;
 use crate::status::Status;
 use clap::Args;
-use manifactor::config::Errors;
+use manifactor::config::{Document, Errors, Format};
 use manifactor::formats::inertial::{Tracks, read_imu, read_states, read_tracks};
+use manifactor::formats::read_text;
 use manifactor::formats::tum::{self, StampedPose};
 use manifactor::geometry::{Camera, CameraModel};
+use manifactor::graph::checked::Positive;
 use manifactor::inertial::diagnosis::Image;
 use manifactor::inertial::visual::{
     InertialState, VisualInertial, VisualInertialDocument, VisualInertialEstimate,
 };
-use manifactor::inertial::{ImuReading, find_damage};
+use manifactor::inertial::{ImuDensities, ImuReading, find_damage};
 use manifactor::slam::metrics::{Alignment, MetricsError, absolute_error, align, associate};
 use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::solve::{AllObservers, Interrupt, Observer};
+use serde::Deserialize;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -146,7 +149,40 @@ pub(super) fn read(path: &Path, set: &[String]) -> Result<VisualInertialDocument
     document.set(set)?;
     let errors = Errors::new();
     let read = document.section(&errors).and_then(|section| section.rest());
-    Ok(errors.finish(read)?)
+    let mut document: VisualInertialDocument = errors.finish(read)?;
+    if let Some(file) = &document.imu_noise {
+        if document.settings.noise != ImuDensities::default() {
+            return Err(Failure::with_help(
+                "`imu_noise` and `settings.noise` both give the noise of the IMU",
+                "leave one of them out",
+            ));
+        }
+        document.settings.noise = read_noise(&path.parent().unwrap_or(Path::new(".")).join(file))?;
+    }
+    Ok(document)
+}
+
+/// The noise of an IMU as Kalibr names it. Other fields of its file are not used.
+#[derive(Deserialize)]
+struct KalibrImu {
+    gyroscope_noise_density: Positive,
+    gyroscope_random_walk: Positive,
+    accelerometer_noise_density: Positive,
+    accelerometer_random_walk: Positive,
+}
+
+/// Reads the noise densities of a file of Kalibr, of its first IMU.
+fn read_noise(file: &Path) -> Result<ImuDensities, Failure> {
+    let document = Document::parse(file.display().to_string(), read_text(file)?, Format::Yaml)?;
+    let (root, errors) = (document.root(), Errors::new());
+    let read = root.field("imu0").unwrap_or(root).read::<KalibrImu>(&errors);
+    let imu = errors.finish(read)?;
+    Ok(ImuDensities {
+        gyroscope: imu.gyroscope_noise_density,
+        gyroscope_walk: imu.gyroscope_random_walk,
+        accelerometer: imu.accelerometer_noise_density,
+        accelerometer_walk: imu.accelerometer_random_walk,
+    })
 }
 
 /// Reads true poses, from CSV as in EuRoC or in the TUM format.

@@ -128,3 +128,37 @@ fn an_error_of_a_part_and_unused_images_are_said_to_be_so() {
     ran.complains("before the first reading of the IMU: not used");
     assert!(ran.stdout.contains("keyframes with a true pose"), "{}", ran.stdout);
 }
+
+#[test]
+fn the_noise_of_the_imu_comes_from_a_file_of_kalibr() {
+    let [imu, tracks, truth, document] = files();
+    let densities = "gyroscope_noise_density: 0.0003\ngyroscope_random_walk: 4e-5\naccelerometer_noise_density: 0.004\naccelerometer_random_walk: 0.005\n";
+    let kalibr = format!("rostopic: /imu0\nupdate_rate: 200.0\n{densities}");
+    let named = document.replace("output =", "imu_noise = \"imu.yaml\"\noutput =");
+    let files = [
+        ("imu.csv", &*imu),
+        ("tracks.csv", &tracks),
+        ("truth.csv", &truth),
+        ("imu.yaml", &kalibr),
+        ("given.toml", &document),
+        ("vio.toml", &named),
+    ];
+    let folder = folder(&files);
+    let out = path(&folder, "out");
+    let cost = |document: &str, set: &[&str]| {
+        let mut command =
+            vec!["vio".to_owned(), path(&folder, document), "--out".into(), out.clone(), "--json".into()];
+        command.extend(set.iter().flat_map(|set| ["--set".to_owned(), (*set).to_owned()]));
+        manifactor(&command.join(" ")).ended(0).json()["final_cost"].as_f64().unwrap()
+    };
+    let given =
+        "settings.noise={gyroscope=0.0003,gyroscope_walk=4e-5,accelerometer=0.004,accelerometer_walk=0.005}";
+    assert_eq!(cost("vio.toml", &[]), cost("given.toml", &[given]));
+    assert_ne!(cost("vio.toml", &[]), cost("given.toml", &[]));
+    let vio = path(&folder, "vio.toml");
+    manifactor(&format!("vio {vio} --set settings.noise.gyroscope=0.1"))
+        .ended(2)
+        .complains("both give the noise of the IMU");
+    std::fs::write(path(&folder, "imu.yaml"), kalibr.replace("gyroscope_random_walk", "walk")).unwrap();
+    manifactor(&format!("vio {vio}")).ended(2).complains("gyroscope_random_walk");
+}
