@@ -41,12 +41,8 @@ pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
 /// # Errors
 /// If a file cannot be written.
 pub fn write_detections(sequence: &Sequence, stem: &Path) -> Result<(), FormatError> {
-    if sequence.detections.iter().any(|detection| detection.ellipse.is_some()) {
-        return Err(no_column(stem, "ellipse"));
-    }
-    let quantities = sequence.detections.iter().flat_map(|detection| detection.quantities.iter());
-    if let Some(other) = quantities.map(Measurement::name).find(|name| *name != "depth") {
-        return Err(no_column(stem, other));
+    if let Some(field) = missing_column(sequence) {
+        return Err(no_column(stem, field));
     }
     for camera in sequence.cameras.iter() {
         let own = sequence.detections.iter().filter(|detection| detection.camera.index == camera.index);
@@ -56,6 +52,16 @@ pub fn write_detections(sequence: &Sequence, stem: &Path) -> Result<(), FormatEr
         detections::write(file, &rows)?;
     }
     Ok(())
+}
+
+/// Returns a field of the boxes that a table does not have; JSON lines have all.
+pub fn missing_column(sequence: &Sequence) -> Option<&'static str> {
+    let other = |detection: &Detection| {
+        let names = detection.quantities.iter().map(Measurement::name).find(|name| *name != "depth");
+        let ellipse = detection.ellipse.map(|_| "ellipse");
+        ellipse.or(detection.camera.lens_from_view.map(|_| "view")).or(names)
+    };
+    sequence.detections.iter().find_map(other)
 }
 
 /// Returns the error of detections with a field that a table does not have.

@@ -27,6 +27,7 @@ use manifactor_mapping::estimate::Estimate;
 use manifactor_mapping::mapping::frame_of;
 use manifactor_mapping::settings::run_document::{RunDocument, RunVariant, absolute_path, slug};
 use manifactor_recording::recording;
+use manifactor_recording::source::format_line;
 use manifactor_solve::{CovarianceError, IterationRecord};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -145,7 +146,16 @@ pub fn write_variant(
         write_whole(&file("live.txt"), tum::format(&online.live))?;
     }
     if report.association.is_some() {
-        recording::write_detections(&estimate.sequence, &file("detections"))?;
+        let (table, frames) = (file("detections"), file("detections.jsonl"));
+        remove(&frames)?;
+        match recording::missing_column(&estimate.sequence) {
+            None => recording::write_detections(&estimate.sequence, &table)?,
+            Some(_) => {
+                remove(&file("detections.csv"))?;
+                let lines = estimate.sequence.observations().map(|frame| format_line(&frame) + "\n");
+                write_whole(&frames, lines.collect::<String>())?;
+            }
+        }
     }
     write_document(&file("objects.json"), format_results(&report.objects))?;
     write_document(&file("frames.jsonl"), lines(&record.frames))?;

@@ -6,6 +6,8 @@ use manifactor_quadric::DualQuadric;
 use manifactor_slam::camera::Cameras;
 use manifactor_slam::estimate::Estimate;
 use manifactor_slam::mapping::Mapping;
+use manifactor_slam::output::write_variant;
+use manifactor_slam::record::VariantRecord;
 use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
@@ -218,4 +220,20 @@ fn a_fisheye_maps_what_is_beside_and_behind_it() {
         let error = (found.quadric.centroid() - objects[k].centroid()).norm();
         assert!(error < 0.02, "object {k}: {error} m");
     }
+}
+
+#[test]
+fn boxes_that_a_table_does_not_hold_are_written_as_lines() {
+    let (_, lines, _) = fisheye_stream();
+    let folder = tempfile::tempdir().unwrap();
+    let mut run = run_of(&fisheye_document(folder.path(), &lines), &["association.type=likelihood"]);
+    run.output = folder.path().join("out");
+    let variant = run.variants.remove(0);
+    let (estimate, report) = Run::new(&run, None).run_variant(&variant, &mut Silent).unwrap();
+    let written = write_variant(&run, &variant, &estimate, &report, &VariantRecord::new(&variant, &estimate));
+    let written = written.unwrap();
+    assert!(!written.join("detections.csv").exists());
+    let lines = std::fs::read_to_string(written.join("detections.jsonl")).unwrap();
+    let boxes = lines.matches("\"view\"").count();
+    assert_eq!((lines.lines().count(), boxes), (40, estimate.sequence.detections.len()));
 }
