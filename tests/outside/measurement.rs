@@ -106,6 +106,6 @@ fn a_line_has_it_the_association_uses_it_and_the_graph_gets_its_factor() {
 fn a_field_of_another_name_is_an_error_with_the_names_there_are() {
     let (distances, objects, warnings) = run("test_distanze", "likelihood");
     assert_eq!((distances, objects), (0, 0));
-    let expected = "unknown field `test_distanze`, expected one of `box`, `class`, `score`, `scores`, `object`, `camera`, `ellipse`, `depth`, `test_distance`";
+    let expected = "unknown field `test_distanze`, expected one of `box`, `class`, `score`, `scores`, `object`, `camera`, `ellipse`, `view`, `depth`, `test_distance`";
     assert!(warnings.contains(expected), "{warnings}");
 }

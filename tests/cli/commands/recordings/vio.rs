@@ -144,10 +144,10 @@ fn the_noise_of_the_imu_comes_from_a_file_of_kalibr() {
         ("vio.toml", &named),
     ];
     let folder = folder(&files);
-    let out = path(&folder, "out");
     let cost = |document: &str, set: &[&str]| {
+        let out = path(&folder, &format!("out_{document}"));
         let mut command =
-            vec!["vio".to_owned(), path(&folder, document), "--out".into(), out.clone(), "--json".into()];
+            vec!["vio".to_owned(), path(&folder, document), "--out".into(), out, "--json".into()];
         command.extend(set.iter().flat_map(|set| ["--set".to_owned(), (*set).to_owned()]));
         manifactor(&command.join(" ")).ended(0).json()["final_cost"].as_f64().unwrap()
     };
