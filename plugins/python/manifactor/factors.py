@@ -39,6 +39,7 @@ __all__ = [
     "horizontal_orientation",
     "horizontal_orientation_smooth",
     "imu",
+    "interpolated",
     "landmark_se2",
     "landmark_se3",
     "max_mixture",
@@ -830,6 +831,54 @@ def imu(
         gravity: Gravity in the world, in m/s². Default: 9.81 m/s² along -z.
     """
     return Factor("imu", {"seconds": seconds, "gyroscope": gyroscope, "accelerometer": accelerometer, "noise": noise, "bias": bias, "gravity": gravity})
+
+
+def interpolated(
+    *,
+    factor: Factor,
+    times: Numbers,
+    time: Number,
+    time_offset: Literal['variable'] | Number | None = None,
+    pose: int | None = None,
+) -> Factor:
+    """A factor on the pose at a time between two poses, for measurements with timestamps of their own.
+
+    Variables: as in `factor`, with the two poses in the place of its pose; then the time offset (`point1`) if it is a
+    variable. Factors of one camera share this variable by its key, to estimate the offset between two clocks. Rows and
+    noise are those of `factor`.
+
+    The pose belongs to `time` + `time_offset` on the clock of the poses. It is X₀ Exp(s Log(X₀⁻¹ X₁)) with s = (`time` +
+    `time_offset` - t₀) / (t₁ - t₀). The sign follows `timeshift_cam_imu` of Kalibr: t_imu = t_cam + shift. The
+    formula is linear interpolation on SE(3), with constant velocity in the frame of the body; see Barfoot, *State
+    Estimation for Robotics*, 2017.
+
+    Before and after the two times, the motion goes on with the same velocity. The factor is not defined more than one
+    interval away, or if the poses differ by a rotation of more than 3.1 rad; it is inactive there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "x1", "l0", "offset"]
+    noise = { sigma = 1.0 }
+
+    [factors.factor]
+    type = "interpolated"
+    times = [12.0, 13.0]
+    time = 12.4
+    time_offset = "variable"
+    factor = { type = "projection", pixel = [310.0, 262.5], camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
+    ```
+
+    Args:
+        factor: Factor with a variable of type `se3`.
+        times: Times of the two poses, in increasing order. Unit: seconds.
+        time: Time of the measurement. Unit: seconds.
+        time_offset: Time on the clock of the poses minus time on the clock of the measurement: a number,
+            or `"variable"` for a further variable of type `point1`, the last one. Default: 0. Unit:
+            seconds.
+        pose: Variable of `factor` that the two poses replace, as an index from 0. Default: the first of
+            type `se3`.
+    """
+    return Factor("interpolated", {"factor": factor, "times": times, "time": time, "time_offset": time_offset, "pose": pose})
 
 
 def landmark_se2(*, position: Numbers) -> Factor:
