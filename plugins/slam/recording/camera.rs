@@ -42,8 +42,14 @@ impl MountedCamera {
 
     /// Returns the pose of this camera, or of its view, from the pose of the first camera.
     pub fn pose(&self, world_from_first: &Se3) -> Se3 {
-        let lens = self.first_from_camera.map_or(*world_from_first, |pose| world_from_first.compose(&pose));
-        self.lens_from_view.map_or(lens, |view| lens.compose(&turn(view)))
+        self.view_pose(
+            &self.first_from_camera.map_or(*world_from_first, |pose| world_from_first.compose(&pose)),
+        )
+    }
+
+    /// Returns the pose of the view from the pose of its lens; the same for the camera itself.
+    pub fn view_pose(&self, world_from_lens: &Se3) -> Se3 {
+        self.lens_from_view.map_or(*world_from_lens, |view| world_from_lens.compose(&turn(view)))
     }
 
     /// Returns a factor on the pose of the first camera, from a factor whose first variable is the pose of this one.

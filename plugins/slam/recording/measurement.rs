@@ -55,10 +55,10 @@ pub trait Measurement: Debug + Send + Sync {
         None
     }
 
-    /// Returns the measurement in the frame of a camera at the same place that looks at the object, or `None` if there
-    /// is none. `cosine` is that of the angle between the two optical axes.
-    fn turned(&self, cosine: f64) -> Option<Arc<dyn Measurement>> {
-        let _ = cosine;
+    /// Returns the measurement in the frame of a camera at the same place that looks at the object, for boxes of wide
+    /// lenses. The argument is the cosine of the angle between the two optical axes. With `None`, the box is used without the
+    /// measurement.
+    fn turned(&self, _cosine: f64) -> Option<Arc<dyn Measurement>> {
         None
     }
 
@@ -159,12 +159,20 @@ impl Quantities {
     }
 
     /// Converts the measurements to a camera at the same place that looks at the object. `cosine` is that of the angle
-    /// between the two optical axes.
-    ///
-    /// # Errors
-    /// The name of a measurement that cannot be converted.
-    pub(crate) fn turned(&self, cosine: f64) -> Result<Self, &'static str> {
-        self.iter().map(|measurement| measurement.turned(cosine).ok_or(measurement.name())).collect()
+    /// between the two optical axes. A measurement that cannot be converted is left out and logged.
+    pub(crate) fn turned(&self, cosine: f64) -> Self {
+        let turned = |measurement: &dyn Measurement| {
+            let turned = measurement.turned(cosine);
+            if turned.is_none() {
+                let angle = cosine.acos().to_degrees();
+                tracing::warn!(
+                    "`{}` at {angle:.0}° from the axis of the lens is left out",
+                    measurement.name()
+                );
+            }
+            turned
+        };
+        self.iter().filter_map(turned).collect()
     }
 
     /// Returns the factors between a frame and an object that `camera` sees. A measurement with invalid standard deviations is

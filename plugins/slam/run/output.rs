@@ -152,6 +152,9 @@ pub fn write_variant(
             None => recording::write_detections(&estimate.sequence, &table)?,
             Some(_) => {
                 remove(&file("detections.csv"))?;
+                for camera in estimate.sequence.cameras.iter().skip(1) {
+                    remove(&file(&format!("detections_{}.csv", camera.name)))?;
+                }
                 let lines = estimate.sequence.observations().map(|frame| format_line(&frame) + "\n");
                 write_whole(&frames, lines.collect::<String>())?;
             }

@@ -204,6 +204,13 @@ fn the_pose_of_a_camera_on_the_body_comes_from_a_file_of_kalibr() {
     let (read, expected) = (poses(&[&camera, &from_file]), poses(&[&given]));
     assert!(read.len() == 40 && read.iter().zip(&expected).all(|(a, b)| a.local(b).norm() < 1e-12));
     assert!(read[0].local(&poses(&[])[0]).norm() > 0.1);
+    // the body of the file is not the first camera
+    let further = format!(
+        "source.cameras.rear={{ camera = {{ file = \"{chain}\" }}, body_from_camera = {{ file = \"{chain}\" }} }}"
+    );
+    let refused = run_of(&document, &[&further]);
+    let error = Run::new(&refused, None).sequence(&refused.variants[0]).unwrap_err().to_string();
+    assert!(error.contains("give `source.body_from_camera` from it, too"), "{error}");
 }
 
 #[test]

@@ -107,7 +107,7 @@ pub struct VisibleObject {
     pub frame: usize,
     /// Index of the camera.
     pub camera: usize,
-    /// Pose of the camera.
+    /// Pose of the camera, without the views of a wide lens.
     pub pose: Se3,
     /// Vector from the centre of the object to the camera.
     from: Vector3<f64>,

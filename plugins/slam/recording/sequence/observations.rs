@@ -74,7 +74,7 @@ impl Sequence {
     pub fn push(&mut self, observation: Observation) {
         let frame = self.frames.len();
         let timestamp = observation.frame.timestamp;
-        self.apply_pose_graph(timestamp, observation.pose_graph);
+        self.apply_pose_graph((frame, timestamp), observation.pose_graph);
         self.frames.push(observation.frame);
         self.detections.extend(observation.detections.into_iter().map(|d| Detection { frame, ..d }));
         self.accelerometer.extend(observation.accelerometer);
@@ -106,12 +106,12 @@ impl Sequence {
         self.detections.extend(boxes);
         self.accelerometer.extend(observation.accelerometer);
         self.unused.extend(observation.unused);
-        self.apply_pose_graph(timestamp, observation.pose_graph);
+        self.apply_pose_graph((frame, timestamp), observation.pose_graph);
     }
 
-    /// Corrects poses, and adds and removes factors on poses before the next frame. Corrections of unknown frames and
+    /// Corrects poses, and adds and removes factors on poses that arrive with a frame, by its index and time. Corrections of unknown frames and
     /// removals of unknown factors become unused input.
-    pub fn apply_pose_graph(&mut self, timestamp: f64, changes: PoseGraphChanges) {
+    pub fn apply_pose_graph(&mut self, (frame, timestamp): (usize, f64), changes: PoseGraphChanges) {
         let PoseGraphChanges { factors, removed, corrected } = changes;
         let unused = |field: String, fault: String| UnusedInput::PoseGraph { timestamp, field, fault };
         let unknown = correct_frames(&mut self.frames, &corrected);
@@ -125,6 +125,39 @@ impl Sequence {
             }
         }
         // the one that a factor replaces stays, in case that the new one cannot be used
-        self.pose_factors.extend(factors.into_iter().map(|factor| (self.frames.len(), factor)));
+        self.pose_factors.extend(factors.into_iter().map(|factor| (frame, factor)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sequence::pose_graph::PoseFactorKey;
+    use crate::sequence::{Frame, SequenceHeader};
+    use manifactor_geometry::{Between, Se3};
+    use manifactor_graph::Noise;
+    use manifactor_quadric::Camera;
+    use std::sync::Arc;
+
+    #[test]
+    fn a_factor_arrives_with_the_frame_that_its_image_joins() {
+        let camera = Camera::new([500.0, 500.0, 320.0, 240.0], 640, 480).unwrap();
+        let mut sequence = SequenceHeader::new(camera).into_sequence();
+        for timestamp in [0.0, 1.0, 1.0] {
+            let factor = PoseFactor {
+                id: None,
+                keys: vec![PoseFactorKey::Timestamp(0.0), PoseFactorKey::Timestamp(timestamp)],
+                factor: Arc::new(Between { relative: Se3::identity() }),
+                noise: Noise::default(),
+                loss: None,
+            };
+            let pose_graph = PoseGraphChanges { factors: vec![factor], ..Default::default() };
+            let frame = Frame::new(timestamp, Se3::identity());
+            sequence.append(Observation { pose_graph, ..Observation::new(frame) });
+        }
+        let arrived: Vec<usize> = sequence.pose_factors.iter().map(|(arrived, _)| *arrived).collect();
+        assert_eq!(arrived, [0, 1, 1]);
+        let replayed = sequence.observations().map(|seen| seen.pose_graph.factors.len());
+        assert_eq!(replayed.collect::<Vec<_>>(), [1, 2]);
     }
 }

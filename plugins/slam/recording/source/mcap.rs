@@ -169,7 +169,7 @@ impl SequenceSource for Mcap {
         let from = [&messages.detections_topic, &messages.odometry_topic].map(Path::new);
         let (frames, mut detections, without): MatchedDetections =
             match_by_time(&poses, images, rows, by, from)?;
-        rig.apply(&mut detections)?;
+        unused.extend(rig.apply(&mut detections, &frames)?);
         unused.extend(without);
         let (mut georeference, mut pose_factors) = (None, vec![]);
         if let Some(settings) = &self.fixes {

@@ -114,8 +114,8 @@ impl SequenceSource for RecordedFiles {
         let files =
             std::iter::once(&self.detections).chain(self.cameras.values().map(|further| &further.detections));
         let files: Vec<_> = files.zip(rig.cameras.iter()).collect();
-        let (mut frames, mut detections, unused) = read_matched(&folder, &self.odometry, &files, by)?;
-        rig.apply(&mut detections)?;
+        let (mut frames, mut detections, mut unused) = read_matched(&folder, &self.odometry, &files, by)?;
+        unused.extend(rig.apply(&mut detections, &frames)?);
         let mut truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         if self.objects.is_some() || truth.is_some() {
             let objects = read_objects(&folder, self.objects.as_deref())?;

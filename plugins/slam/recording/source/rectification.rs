@@ -44,7 +44,7 @@ impl Rectification {
 
     /// Creates the rectification for a camera model.
     pub(super) fn of_model(model: Arc<dyn AnyCamera>) -> Self {
-        Self { camera: model.pinhole(), is_wide: is_wide(&*model), model: Some(model) }
+        Self { camera: model.pinhole(), is_wide: stretches(&*model), model: Some(model) }
     }
 
     /// Creates the rectification for a pinhole camera, with an optional distortion of its lens.
@@ -55,44 +55,52 @@ impl Rectification {
         }
     }
 
+    /// Returns whether each box has a pinhole camera of its own.
+    pub(super) fn is_wide(&self) -> bool {
+        self.is_wide
+    }
+
     /// Rectifies the box and the ellipse of a detection. For a wide lens, its camera becomes the view around the box.
     ///
     /// # Errors
-    /// If there is no such box, or a measurement has no place in the view. The detection is then unchanged.
+    /// If there is no such box.
     pub(super) fn rectify(&self, detection: &mut Detection) -> Result<(), String> {
         let Some(model) = self.model.as_ref().filter(|_| detection.camera.view().is_none()) else {
             return Ok(());
         };
         let seen = detection.bounding_box;
         let fault = || format!("{:?} has no place in the rectified image of the camera", seen.bounds());
-        let view = match self.is_wide {
-            true => Some(model.view(&seen.centre()).ok_or_else(fault)?),
-            false => None,
-        };
-        let map = |pixel: &Vector2<f64>| match &view {
-            Some(view) => view.project(&model.ray(pixel)?),
-            None => model.rectify(pixel),
-        };
-        let bounding_box = rectified(map, &seen).ok_or_else(fault)?;
-        let ellipse = match detection.ellipse {
-            Some(ellipse) => Some(ellipse.mapped(map).ok_or_else(fault)?),
-            None => None,
-        };
-        if let Some(view) = &view {
-            let cosine = view.lens_from_view.matrix()[(2, 2)];
-            detection.quantities = detection
-                .quantities
-                .turned(cosine)
-                .map_err(|name| format!("`{name}` cannot be measured in this direction"))?;
-            detection.camera = Arc::new(detection.camera.viewed(view));
+        if !self.is_wide {
+            let map = |pixel: &Vector2<f64>| model.rectify(pixel);
+            let bounding_box = rectified(map, &seen).ok_or_else(fault)?;
+            if let Some(ellipse) = &mut detection.ellipse {
+                *ellipse = ellipse.mapped(map).ok_or_else(fault)?;
+            }
+            detection.bounding_box = bounding_box;
+            return Ok(());
         }
-        (detection.bounding_box, detection.ellipse) = (bounding_box, ellipse);
+        let mut view = model.view(&seen.centre()).ok_or_else(fault)?;
+        let first = rectified(|pixel| view.project(&model.ray(pixel)?), &seen).ok_or_else(fault)?;
+        // the distances of the sides from the border of the image stay
+        let camera = &mut view.camera;
+        (camera.cx, camera.cy) = (camera.cx + seen.xmin - first.xmin, camera.cy + seen.ymin - first.ymin);
+        let grown = |size: u32, by: f64| (f64::from(size) + by).round().max(1.0) as u32;
+        camera.width = grown(camera.width, first.width() - seen.width());
+        camera.height = grown(camera.height, first.height() - seen.height());
+        let map = |pixel: &Vector2<f64>| view.project(&model.ray(pixel)?);
+        let bounding_box = rectified(map, &seen).ok_or_else(fault)?;
+        if let Some(ellipse) = &mut detection.ellipse {
+            *ellipse = ellipse.mapped(map).ok_or_else(fault)?;
+        }
+        detection.bounding_box = bounding_box;
+        detection.quantities = detection.quantities.turned(view.lens_from_view.matrix()[(2, 2)]);
+        detection.camera = Arc::new(detection.camera.viewed(&view));
         Ok(())
     }
 }
 
 /// Returns whether the rectified image stretches a pixel at the border of the image too much, or does not have it.
-fn is_wide(model: &dyn AnyCamera) -> bool {
+fn stretches(model: &dyn AnyCamera) -> bool {
     let [width, height] = model.pinhole().size().into();
     let border = [0.0, 0.5, 1.0].map(|x| [0.0, 0.5, 1.0].map(|y| Vector2::new(x * width, y * height)));
     let stretch = |pixel: &Vector2<f64>| {
@@ -218,16 +226,32 @@ mod tests {
     }
 
     #[test]
-    fn a_depth_behind_a_wide_lens_is_refused() {
+    fn a_depth_behind_a_wide_lens_is_left_out() {
         let backwards = Camera { fx: 200.0, fy: 200.0, ..CameraModel::pinhole(&fisheye()) };
         let lens = Rectification::of_model(Arc::new(KannalaBrandt::new(backwards, [0.0; 4])));
-        let bounds = [740.0, 380.0, 780.0, 420.0];
-        let mut seen = seen_by(&lens, bounds, Some(1.0));
-        assert!(lens.rectify(&mut seen).unwrap_err().contains("`depth` cannot be measured"));
-        assert_eq!(seen.bounding_box.bounds(), bounds);
-        let mut seen = seen_by(&lens, bounds, None);
+        let mut seen = seen_by(&lens, [740.0, 380.0, 780.0, 420.0], Some(1.0));
         lens.rectify(&mut seen).unwrap();
+        assert_eq!(seen.quantities.depth(), None);
         let axis = seen.camera.pose(&Se3::identity()).rotation.act(&Vector3::z());
         assert!(axis.z < 0.0, "{axis}");
+    }
+
+    #[test]
+    fn a_box_of_a_wide_lens_keeps_its_distances_from_the_border() {
+        let lens = Rectification::of_model(Arc::new(fisheye()));
+        for bounds in
+            [[150.0, 300.0, 650.0, 500.0], [530.0, 40.0, 770.0, 700.0], [100.0, 380.0, 140.0, 420.0]]
+        {
+            let mut seen = seen_by(&lens, bounds, None);
+            lens.rectify(&mut seen).unwrap();
+            let ([xmin, ymin, xmax, ymax], camera) = (seen.bounding_box.bounds(), seen.camera.model);
+            let size = camera.size();
+            let found = [xmin, ymin, size.x - xmax, size.y - ymax];
+            let expected = [bounds[0], bounds[1], 800.0 - bounds[2], 800.0 - bounds[3]];
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.51), "{found:?}");
+            // the view still sees the centre of the box ahead
+            let axis = camera.ray(Vector2::new(camera.cx, camera.cy));
+            assert!(axis.xy().norm() < 1e-12, "{axis}");
+        }
     }
 }

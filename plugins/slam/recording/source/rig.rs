@@ -2,7 +2,7 @@
 use super::rectification::Rectification;
 use super::{CameraChoice, CameraPose, SourceError};
 use crate::camera::Cameras;
-use crate::sequence::{Detection, Observation, UnusedInput};
+use crate::sequence::{Detection, Frame, Observation, UnusedInput};
 use manifactor_geometry::Se3;
 use std::path::Path;
 
@@ -32,6 +32,14 @@ impl Rig {
         folder: &Path,
     ) -> Result<Self, SourceError> {
         for (name, camera, body_from_camera) in cameras {
+            if let (None, Some(file)) = (self.body_from_first, body_from_camera.file()) {
+                return Err(SourceError::Calibration {
+                    file: folder.join(file),
+                    fault: format!(
+                        "it gives the pose of `{name}` on the body of the file: give `source.body_from_camera` from it, too"
+                    ),
+                });
+            }
             self.add(name, Rectification::new(camera, None, folder)?, body_from_camera.read(folder)?)?;
         }
         Ok(self)
@@ -55,15 +63,30 @@ impl Rig {
         Ok(())
     }
 
-    /// Rectifies the boxes of a recording.
+    /// Rectifies the boxes of a recording. Boxes of a wide lens that it cannot have seen are left out and returned.
     ///
     /// # Errors
-    /// If a box has no place in the rectified image.
-    pub(super) fn apply(&self, detections: &mut [Detection]) -> Result<(), SourceError> {
-        detections.iter_mut().try_for_each(|detection| {
+    /// If a box of another lens has no place in the rectified image.
+    pub(super) fn apply(
+        &self,
+        detections: &mut Vec<Detection>,
+        frames: &[Frame],
+    ) -> Result<Vec<UnusedInput>, SourceError> {
+        let (mut rectified, mut unused, mut image) = (vec![], vec![], (usize::MAX, 0));
+        for mut detection in detections.drain(..) {
             let frame = detection.frame;
-            self.rectify(detection).map_err(|fault| SourceError::Distorted { frame, fault })
-        })
+            image = (frame, if image.0 == frame { image.1 + 1 } else { 1 });
+            match self.rectify(&mut detection) {
+                Ok(()) => rectified.push(detection),
+                Err(fault) if self.lenses.get(detection.camera.index).is_some_and(Rectification::is_wide) => {
+                    let timestamp = frames.get(frame).map_or(f64::NAN, |frame| frame.timestamp);
+                    unused.push(UnusedInput::Box { timestamp, place: image.1, fault });
+                }
+                Err(fault) => return Err(SourceError::Distorted { frame, fault }),
+            }
+        }
+        *detections = rectified;
+        Ok(unused)
     }
 
     /// Rectifies the boxes of one frame. Boxes without a place in the rectified image are left out and

@@ -77,9 +77,9 @@ impl SequenceSource for TumRgbd {
             without_pose: self.max_without_pose,
             max_pose_gap: self.max_pose_gap,
         };
-        let (frames, mut detections, unused) =
+        let (frames, mut detections, mut unused) =
             read_matched(&folder, &self.odometry, &[(&self.detections, rig.cameras.first())], by)?;
-        rig.apply(&mut detections)?;
+        unused.extend(rig.apply(&mut detections, &frames)?);
         let truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         let file = folder.join("accelerometer.txt");
         let readings = if file.is_file() { accelerometer::read(&file)? } else { vec![] };

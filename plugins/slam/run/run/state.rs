@@ -61,7 +61,9 @@ impl StreamState {
         let taken = self.mapper.add_frame(&observation);
         if taken.is_err() {
             // later poses refer to them
-            self.sequence.apply_pose_graph(observation.frame.timestamp, observation.pose_graph.clone());
+            let last = self.sequence.frames.len().saturating_sub(1);
+            let arrival = (last, observation.frame.timestamp);
+            self.sequence.apply_pose_graph(arrival, observation.pose_graph.clone());
         }
         let mut report = taken?;
         self.association.record_frame(&observation.detections, Some(&report));

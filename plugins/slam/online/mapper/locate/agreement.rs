@@ -100,7 +100,7 @@ impl Mapper {
     fn is_shown(&self, sight: &VisibleObject, object: &PriorObject, by_name: bool) -> bool {
         self.measurements.objects.iter().any(|measured| {
             let shows = |view: &ObjectBox| {
-                let outline = outline(&sight.pose, &object.quadric, view);
+                let outline = outline(&view.camera.view_pose(&sight.pose), &object.quadric, view);
                 outline.is_some_and(|outline| outline.iou(&view.bounding_box) >= MIN_SHOWN_IOU)
             };
             let may_be = || match by_name {

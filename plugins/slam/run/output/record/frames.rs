@@ -151,8 +151,9 @@ fn boxes(estimate: &Estimate) -> BTreeMap<usize, Vec<BoxRecord>> {
     for object in &estimate.mapping.measurements.objects {
         // the page shows the images of the first camera
         for view in object.views.iter().filter(|view| view.camera.index == 0) {
-            let camera: Option<&Se3> = estimate.solution.values.get(pose_key(view.frame)).ok();
-            let seen = camera.zip(quadrics.get(&object.id).copied());
+            let first = estimate.solution.values.get(pose_key(view.frame));
+            let camera = first.ok().map(|pose: &Se3| view.camera_pose(pose));
+            let seen = camera.as_ref().zip(quadrics.get(&object.id).copied());
             let seen = BoxRecord::new(object.id, view.bounding_box, seen, &view.camera.model);
             boxes.entry(view.frame).or_default().push(seen);
         }
