@@ -14,6 +14,7 @@ use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::{Detection, Sequence};
 use manifactor_solve::Silent;
 use nalgebra::{Matrix3, Matrix4, Vector3};
+use serde_json::Value;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -246,4 +247,17 @@ fn boxes_that_a_table_does_not_hold_are_written_as_lines() {
     let lines = std::fs::read_to_string(written.join("detections.jsonl")).unwrap();
     let boxes = lines.matches("\"view\"").count();
     assert_eq!((lines.lines().count(), boxes), (40, estimate.sequence.detections.len()));
+    // the outlines are those in the views
+    let frames = std::fs::read_to_string(written.join("frames.jsonl")).unwrap();
+    let frames: Vec<Value> = frames.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let side = |seen: &Value, name: &str, i: usize| seen[name][i].as_f64().unwrap();
+    let all = frames.iter().flat_map(|frame| frame["boxes"].as_array().unwrap());
+    let drawn: Vec<&Value> = all.filter(|seen| seen["projected"].is_array()).collect();
+    assert!(drawn.len() > 300, "{} outlines", drawn.len());
+    for seen in drawn {
+        for i in 0..4 {
+            let error = side(seen, "projected", i) - side(seen, "measured", i);
+            assert!(error.abs() < 5.0, "{seen}");
+        }
+    }
 }
