@@ -5,7 +5,7 @@
 //! one.
 #[doc(hidden)]
 pub mod __private {
-    pub use crate::bundle::camera_model::{CameraNames, UncalibratedName, rectify};
+    pub use crate::bundle::camera_model::{CameraNames, UncalibratedName};
     pub use manifactor_graph;
     pub use nalgebra::{Vector2, Vector3};
 }

@@ -96,14 +96,16 @@ pub trait AnyCamera: Debug + Send + Sync {
     /// Returns the pinhole camera of the rectified image.
     fn pinhole(&self) -> Camera;
 
-    /// Maps a pixel of the original image to the rectified image; `None` if there is no such pixel.
-    fn rectify(&self, pixel: &Vector2<f64>) -> Option<Vector2<f64>>;
-
     /// Returns the direction of a pixel in the frame of the camera, of any length; `None` if the model has none.
     fn ray(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>>;
 
     /// Returns the pinhole camera that agrees with this camera around a pixel; `None` if the pixel has no direction.
     fn view(&self, pixel: &Vector2<f64>) -> Option<CameraView>;
+
+    /// Maps a pixel of the original image to the rectified image; `None` beyond 70° from the optical axis.
+    fn rectify(&self, pixel: &Vector2<f64>) -> Option<Vector2<f64>> {
+        project_ahead(&self.pinhole(), &self.ray(pixel)?)
+    }
 }
 
 manifactor_graph::kind!(dyn AnyCamera, "camera");
@@ -127,12 +129,6 @@ pub trait UncalibratedName {
 /// Cosine of the largest angle to the optical axis in the rectified image, 70°. There, a pixel of a fisheye camera
 /// is stretched 8 times, and the noise of a box with it.
 const MIN_COSINE: f64 = 0.342;
-
-/// Maps a pixel of a camera to the rectified image; `None` for a direction more than 70° from the optical axis.
-#[doc(hidden)]
-pub fn rectify<M: CameraModel>(camera: &M, pixel: &Vector2<f64>) -> Option<Vector2<f64>> {
-    project_ahead(&camera.pinhole(), &camera.unproject(pixel)?)
-}
 
 /// Returns the pixel of a direction; `None` beyond 70° from the optical axis.
 pub(super) fn project_ahead(camera: &Camera, direction: &Vector3<f64>) -> Option<Vector2<f64>> {
@@ -204,12 +200,6 @@ macro_rules! register_camera {
             impl $crate::AnyCamera for $type {
                 fn pinhole(&self) -> $crate::Camera {
                     $crate::CameraModel::pinhole(self)
-                }
-                fn rectify(
-                    &self,
-                    pixel: &$crate::__private::Vector2<f64>,
-                ) -> ::std::option::Option<$crate::__private::Vector2<f64>> {
-                    $crate::__private::rectify(self, pixel)
                 }
                 fn ray(
                     &self,

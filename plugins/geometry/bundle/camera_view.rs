@@ -6,19 +6,20 @@ use serde::{Deserialize, Serialize};
 
 /// A pinhole camera turned towards the direction of one pixel of a lens.
 ///
-/// It has the pixel at the same place as the lens, and its neighbourhood to first order, so that the noise of
-/// measurements there is the same. Each box in the image of a wide lens has its own.
+/// Around the pixel, its image is the image of the lens to first order, up to a shift. The noise of measurements there
+/// is therefore the same. Each box in the image of a wide lens has its own view.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraView {
     /// Rotation from the view to the lens.
     pub lens_from_view: So3,
-    /// The pinhole camera, with the pixel as principal point and the size of the lens's image.
+    /// The pinhole camera. Its principal point is the image of the pixel.
     pub camera: Camera,
 }
 
 impl CameraView {
-    /// Creates the view at a pixel; `None` if the lens has no ray there.
+    /// Creates the view at a pixel, with the pixel at the same place and the image size of the lens; `None` if the lens
+    /// has no ray there.
     pub fn new(lens: &impl CameraModel, pixel: &Vector2<f64>) -> Option<Self> {
         let z = lens.unproject(pixel)?.try_normalize(0.0).filter(|ray| lens.sees(ray))?;
         // both gradients are orthogonal to the ray, since a projection does not depend on the distance

@@ -158,7 +158,7 @@ impl Quantities {
         self.iter().find_map(Measurement::depth)
     }
 
-    /// Converts the measurements to a camera at the same place that looks at the object. `cosine` is that of the angle
+    /// Converts the measurements to a camera at the same place that looks at the object. `cosine` belongs to the angle
     /// between the two optical axes. A measurement that cannot be converted is left out and logged.
     pub(crate) fn turned(&self, cosine: f64) -> Self {
         let turned = |measurement: &dyn Measurement| {

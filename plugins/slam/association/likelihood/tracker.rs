@@ -168,37 +168,32 @@ impl Tracker {
         boxes: &[usize],
         pose: &Se3,
     ) -> (Vec<(usize, usize, f64)>, Vec<usize>) {
-        let camera = |i: &usize| &*image.detections[*i].camera;
-        let mut rows = 0..boxes.len();
+        let boxes: Vec<(usize, &Detection)> =
+            boxes.iter().map(|i| &image.detections[*i]).enumerate().collect();
+        let Some((_, first)) = boxes.first() else { return Default::default() };
+        // views of one lens differ by their rotations
+        let usual = self.usual_depth(&first.camera.pose(pose));
         // one group, unless a wide lens has a view around each box
-        let view = |own: &[usize]| {
-            let pose = camera(&own[0]).pose(pose);
-            let usual = self.usual_depth(&pose);
-            let own: Vec<(usize, &Detection)> =
-                own.iter().map(|i| (rows.next().unwrap_or_default(), &image.detections[*i])).collect();
-            (pose, usual, own)
-        };
-        let views: Vec<_> = boxes.chunk_by(|a, b| camera(a) == camera(b)).map(view).collect();
+        let groups = boxes.chunk_by(|(_, a), (_, b)| a.camera == b.camera);
+        let views: Vec<_> =
+            groups.map(|own| (own[0].1.camera.pose(pose), &own[0].1.camera.model, own)).collect();
         let classes: Vec<Option<String>> =
-            boxes.iter().map(|i| self.best_class(&image.detections[*i])).collect();
+            boxes.iter().map(|(_, detection)| self.best_class(detection)).collect();
         let began = self.start_time.unwrap_or(image.timestamp - PRIOR_OBJECT_AGE_S);
         let (mut gains, mut tracks) = (vec![], vec![]);
         for (t, track) in self.tracks.iter().enumerate() {
             let since = track.last_seen_s.unwrap_or(began);
             let unseen = (image.timestamp - since).max(0.0);
             let before = gains.len();
-            for (pose, usual, own) in &views {
-                let Some(camera) = own.first().map(|(_, detection)| &detection.camera.model) else {
-                    continue;
-                };
+            for (pose, camera, own) in &views {
                 let Some(expected) = track.expected_box(unseen, pose, camera, &self.settings) else {
                     continue;
                 };
-                for (row, detection) in own {
+                for (row, detection) in *own {
                     if !detection.bounding_box.intersects(expected.bounding_box()) {
                         continue;
                     }
-                    let new = self.settings.cost_of_new(camera, &detection.quantities, *usual);
+                    let new = self.settings.cost_of_new(camera, &detection.quantities, usual);
                     let cost = expected.cost(&detection.bounding_box, &detection.quantities)
                         - 2.0 * self.class_likelihood(track, classes[*row].as_deref()).ln();
                     if cost < new {

@@ -41,8 +41,8 @@ pub enum CameraChoice {
 pub enum CameraPose {
     /// The pose: the translation in metres, and the rotation as a unit quaternion (x, y, z, w).
     Pose(Se3),
-    /// A calibration file of Kalibr: the pose in the frame of its IMU (`T_cam_imu`) or, without an IMU, in that of its
-    /// first camera (`T_cn_cnm1`).
+    /// A calibration file of Kalibr: the pose in the frame of its IMU (`T_cam_imu`) or, without an IMU, of its first
+    /// camera (`T_cn_cnm1`).
     File(CalibrationFile),
 }
 

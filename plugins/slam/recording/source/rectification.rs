@@ -1,7 +1,7 @@
 //! Rectification of boxes to pinhole cameras.
 //!
 //! The outline of an ellipsoid is a conic only for a pinhole camera. All code after a source therefore uses
-//! pinhole cameras: that of the rectified image or, for a wide lens, one for each box.
+//! pinhole cameras: the one of the rectified image or, for a wide lens, one for each box.
 use super::{CameraChoice, SourceError};
 use crate::sequence::Detection;
 use manifactor_geometry::{AnyCamera, Distortion, RadialTangential};
@@ -17,7 +17,7 @@ pub(super) struct Rectification {
     pub(super) camera: Camera,
     /// Model of the images; `None` if they come from the pinhole camera itself.
     model: Option<Arc<dyn AnyCamera>>,
-    /// Whether each box has a pinhole camera of its own.
+    /// Whether each box gets a view of its own.
     is_wide: bool,
 }
 
@@ -55,7 +55,7 @@ impl Rectification {
         }
     }
 
-    /// Returns whether each box has a pinhole camera of its own.
+    /// Returns whether each box gets a view of its own.
     pub(super) fn is_wide(&self) -> bool {
         self.is_wide
     }

@@ -176,7 +176,7 @@ fn yaml(file: &Path, text: &str) -> Result<Vec<NamedCamera>, SourceError> {
 const NO_POSE: &str = "expected its pose, `T_cam_imu` or `T_cn_cnm1` of Kalibr";
 
 impl KalibrCamera {
-    /// Returns the place on the body, from that of the camera before it. The body is the IMU or, without it, the first
+    /// Returns the place on the body. `last` is the place of the camera before it. The body is the IMU or, without it, the first
     /// camera.
     fn mounting(&self, last: Option<Result<Mounting, String>>) -> Result<Mounting, String> {
         let pose = |name: &str, rows: &[[f64; 4]; 4]| {
